@@ -42,7 +42,7 @@ from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.bounds import wider
-from rolling_panda.commands import COMMAND_OF, Handlers
+from rolling_panda.commands import COMMAND_OF, Condition, Handlers
 from rolling_panda.config import RobotConfig
 from rolling_panda.errors import ControlError
 from rolling_panda.messages.perception import CloseUpRequest, CloseUpResult, Obstacles
@@ -304,7 +304,17 @@ class Controller:
         return CloseUpRequest(epoch=token.epoch, number=due[0], point_id=due[1])
 
     def _situation(self, now: float, intent: intents.Intent | None = None) -> Situation:
-        return self._supervisor.situation(self._queue.waits, self._previews.start_refused(), now, intent)
+        supervisor, queue, previews = self._supervisor, self._queue, self._previews
+        work: dict[Condition, m.Reason | None] = {
+            "workable point": queue.waits,
+            "acceptable point": queue.none_acceptable(),
+            "voided acceptances": queue.undo_refused,
+            "order by hand": queue.order.reset_refused,
+            "approved preview": previews.start_refused(),
+            "preview to approve": previews.approval_refused,
+            "stop to release": supervisor.stops.reset_refused(supervisor.bridge, now),
+        }
+        return supervisor.situation(work, now, intent)
 
     def _change_mode(self, asked: intents.Intent, now: float) -> m.Reason | None:
         """Process the command's event. A client that moves a robot without a holder gets control."""

@@ -376,9 +376,22 @@ class ReturnControl(Intent, frozen=True, kw_only=True):
 Handler = Callable[[Any, float], Reason | None]
 Handlers = dict[type[Struct], Handler]
 
-#: Condition of a command beside its mode; `controller/supervision/permission.py` checks each.
+#: Condition of a command beside its mode, whatever its arguments are. `controller/supervision/permission.py` checks
+#: those of the robot, `controller/core.py` those of the work.
 Condition = Literal[
-    "fresh sensors", "bridge obeys", "server", "at rest", "workable point", "approved preview", "perception", "watched"
+    "fresh sensors",
+    "bridge obeys",
+    "server",
+    "at rest",
+    "workable point",
+    "approved preview",
+    "perception",
+    "watched",
+    "acceptable point",
+    "voided acceptances",
+    "order by hand",
+    "preview to approve",
+    "stop to release",
 ]
 #: Section of the REST interface.
 Tag = Literal["mode", "points", "preview", "control"]
@@ -483,8 +496,8 @@ COMMANDS: Final[tuple[Command, ...]] = (
         conditions=_MOTION,
     ),
     Command(Acknowledge, "mode", "/acknowledge", control=True, event=Event.ACKNOWLEDGE),
-    Command(Reset, "mode", "/reset", role="supervisor", event=Event.RESET),
-    Command(AcceptAll, "points", "/points/accept-all"),
+    Command(Reset, "mode", "/reset", role="supervisor", event=Event.RESET, conditions=("stop to release",)),
+    Command(AcceptAll, "points", "/points/accept-all", conditions=("acceptable point",)),
     Command(
         AcceptPoint,
         "points",
@@ -504,7 +517,12 @@ COMMANDS: Final[tuple[Command, ...]] = (
         lambda asked: reasons.decision_undone(asked.user, asked.point_id),
     ),
     Command(ResolvePoint, "points", "/points/{point_id}/resolve", _resolved),
-    Command(RestoreAccepted, "points", log=lambda asked: reasons.rule_undone(asked.user)),
+    Command(
+        RestoreAccepted,
+        "points",
+        log=lambda asked: reasons.rule_undone(asked.user),
+        conditions=("voided acceptances",),
+    ),
     Command(
         MoveInQueue,
         "points",
@@ -515,18 +533,26 @@ COMMANDS: Final[tuple[Command, ...]] = (
     Command(AddPointInImage, "points", "/points/by-hand-in-image", process="perception"),
     Command(MovePoint, "points", "/points/{point_id}/move", process="perception"),
     Command(SetApproach, "points", "/points/{point_id}/approach", _approach),
-    Command(ResetOrder, "points", "/order/planners", lambda asked: reasons.order_restored(asked.user)),
+    Command(
+        ResetOrder,
+        "points",
+        "/order/planners",
+        lambda asked: reasons.order_restored(asked.user),
+        conditions=("order by hand",),
+    ),
     Command(
         RequestPreview,
         "preview",
         "/preview",
         _previewed,
+        conditions=("workable point",),
     ),
     Command(
         ApprovePreview,
         "preview",
         "/preview/approve",
         lambda asked: reasons.preview_approved(asked.user, asked.preview_hash[:8]),
+        conditions=("preview to approve",),
     ),
     Command(
         RequirePreview,

@@ -81,6 +81,19 @@ class PreviewManager:
         return self._expired or reasons.preview_needed()
 
     @property
+    def approval_refused(self) -> Reason | None:
+        """Reason why no preview can be approved; None if the current one can."""
+        preview = self._preview
+        if preview is None or self._phase not in ("ready", "approved", "expired"):
+            return reasons.preview_missing()
+        if expired := self._expired:
+            return expired
+        following, first = self._queue.next(), preview.request.points[0].point_id
+        if following is not None and following.point.point_id != first:
+            return reasons.another_comes_first(following.point.point_id, first)
+        return None
+
+    @property
     def _expired(self) -> Reason | None:
         if self._phase != "expired" or self._reason is None:
             return None
@@ -201,7 +214,7 @@ class PreviewManager:
     def _want(self, point_id: str, now: float) -> Reason | None:
         ticket = self._queue.get(point_id) if point_id else self._queue.next()
         if ticket is None:
-            return reasons.point_unknown(point_id) if point_id else self._queue.waits
+            return reasons.point_unknown(point_id)
         if ticket.state == "UNREACHABLE" and ticket.reason is not None:
             return reasons.point_unreachable(point_id, ticket.reason)
         if not ticket.seen:
@@ -214,16 +227,9 @@ class PreviewManager:
         return None
 
     def _approve(self, digest: str, user: str) -> Reason | None:
-        preview = self._preview
-        if preview is None or self._phase not in ("ready", "approved", "expired"):
-            return reasons.preview_missing()
-        if digest != preview.digest:
-            return reasons.preview_replaced(preview.digest[:8], digest[:8])
-        if expired := self._expired:
-            return expired
-        following, first = self._queue.next(), preview.request.points[0].point_id
-        if following is not None and following.point.point_id != first:
-            return reasons.another_comes_first(following.point.point_id, first)
+        shown = "" if self._preview is None else self._preview.digest
+        if digest != shown:
+            return reasons.preview_replaced(shown[:8], digest[:8])
         self._approved_by = user
         self._set_phase("approved")
         return None

@@ -1,7 +1,7 @@
 """Permission of each command in the present state, with the reason of a refusal."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Final
 
 from controller.config import SupervisionConfig
@@ -23,10 +23,9 @@ class Situation:
         health: Health of the inputs.
         homing: True during homing.
         busy: Action that blocks a new motion; None when none.
-        waits: Reason why no accepted point is workable; None when one is.
+        work: Reason why each condition of the work does not hold; None when it does.
         rights: Rights of the client.
         not_theirs: Reason why the client may not move the robot; None when it may.
-        approval: Reason why a start needs an approved preview first; None when it does not.
         unwatched: Reason why automatic work lacks an attentive operator; None when it has one.
     """
 
@@ -35,32 +34,29 @@ class Situation:
     health: safety.Health
     homing: bool
     busy: Reason | None
-    waits: Reason | None
+    work: Mapping[Condition, Reason | None] = field(default_factory=dict)
     rights: modes.Rights = modes.ANYBODY
     not_theirs: Reason | None = None
     unwatched: Reason | None = None
-    approval: Reason | None = None
 
 
 #: Name of motion by hand, which is asked for by a stream of targets rather than by a command.
 HOLD: Final = "Teleoperation"
 _OF_HOLDER: Final = (*(command.name for command in COMMANDS if command.control), HOLD)
 
-#: Check of each condition: the reason why it does not hold, None if it does.
+#: Check of each condition of the robot: the reason why it does not hold, None if it does.
 _CHECKS: Final[dict[Condition, Callable[[Situation], Reason | None]]] = {
     "fresh sensors": lambda now: safety.sensors(now.health, now.config),
     "bridge obeys": lambda now: reasons.watchdog_holds() if now.health.watchdog else None,
     "server": lambda now: safety.supervision(now.health, now.config, False),
     "at rest": lambda now: now.busy,
-    "workable point": lambda now: now.waits,
-    "approved preview": lambda now: now.approval,
     "perception": lambda now: safety.perception(now.health, now.config),
     "watched": lambda now: now.unwatched,
 }
 
 
 def refusal(command: Command, now: float, situation: Situation) -> Reason | None:
-    """Reason why a command is refused now, apart from its content; None if it is allowed.
+    """Reason why a command is refused now whatever its arguments are; None if it is allowed.
 
     Args:
         command: Row of the table.
@@ -78,7 +74,12 @@ def refusal(command: Command, now: float, situation: Situation) -> Reason | None
             return refused
     if command.modes and mode not in command.modes:
         return reasons.wrong_mode(command.name, " and ".join(command.modes), mode)
-    return next((why for each in command.conditions if (why := _CHECKS[each](situation)) is not None), None)
+    return next((why for each in command.conditions if (why := _missing(each, situation)) is not None), None)
+
+
+def _missing(condition: Condition, situation: Situation) -> Reason | None:
+    check = _CHECKS.get(condition)
+    return situation.work[condition] if check is None else check(situation)
 
 
 def hold_refusal(situation: Situation) -> Reason | None:
@@ -100,7 +101,7 @@ def of_holder(mode: Mode) -> tuple[str, ...]:
 
 
 def allowed(now: float, situation: Situation) -> dict[str, Reason | None]:
-    """Reason why each command, or a hold, would be refused now; None if it would be taken.
+    """Reason why each command, or a hold, would be refused now; None if it would be taken with valid arguments.
 
     Commands about control are left out.
     """

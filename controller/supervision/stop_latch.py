@@ -70,21 +70,26 @@ class StopLatch:
             latched = latched or _reason(record)
         return latched
 
+    def reset_refused(self, bridge: m.BridgeState | None, now: float) -> m.Reason | None:
+        """Reason why no stop can be reset; None if one can."""
+        if bridge is None:
+            return reasons.stop_unknown()
+        if self._asked is not None and now - self._asked_at < _RELEASE_S:
+            return reasons.reset_under_way()
+        return None
+
     def ask_release(self, intent: intents.Reset, bridge: m.BridgeState | None, now: float) -> m.Reason | None:
-        """A supervisor resets; returns why not.
+        """A supervisor resets, where `reset_refused` has no reason; returns why not.
 
         The release goes to the bridge, and only its state ends the latch.
         """
-        if bridge is None:
-            return reasons.stop_unknown()
-        newest = bridge.stop_id or next(reversed(self._pending), "")
+        held = "" if bridge is None else bridge.stop_id
+        newest = held or next(reversed(self._pending), "")
         if intent.stop_id and intent.stop_id != newest:
             return reasons.stop_newer()
-        if self._asked is not None and now - self._asked_at < _RELEASE_S:
-            return reasons.reset_under_way()
         self._asked, self._asked_at = intent, now
-        if bridge.stop_id:
-            self._due = m.ReleaseStop(stop_id=bridge.stop_id, user=intent.user, reason=intent.reason)
+        if held:
+            self._due = m.ReleaseStop(stop_id=held, user=intent.user, reason=intent.reason)
         return None
 
     def release_due(self) -> m.ReleaseStop | None:

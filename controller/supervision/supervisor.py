@@ -1,6 +1,6 @@
 """Supervision of one robot: mode, latched stops, control authority and health of the inputs."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Final
 
@@ -18,6 +18,7 @@ from controller.work.movement import Movement
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda import reasons
+from rolling_panda.commands import Condition
 from rolling_panda.messages.supervision import Presence, StopRecord, TeleopTarget
 from rolling_panda.transport.inbox import Inbox
 
@@ -146,13 +147,12 @@ class Supervisor:
         return self._movement.busy(self.bridge)
 
     def situation(
-        self, waits: m.Reason | None, approval: m.Reason | None, now: float, intent: intents.Intent | None = None
+        self, work: Mapping[Condition, m.Reason | None], now: float, intent: intents.Intent | None = None
     ) -> Situation:
         """State that a permission depends on.
 
         Args:
-            waits: Reason why no accepted point is workable; None if one is.
-            approval: Reason why the start needs an approved preview; None if it does not.
+            work: Reason why each condition of the work does not hold; None if it does.
             now: Monotonic time (s).
             intent: The command; None for any operator.
         """
@@ -166,8 +166,7 @@ class Supervisor:
             health=self.health,
             homing=self._movement.homing,
             busy=self.busy(),
-            waits=waits,
-            approval=approval,
+            work=work,
         )
 
     def _review_token(self, now: float) -> None:
@@ -215,7 +214,7 @@ class Supervisor:
         if self.mode == "TELEOP" and not holding:
             self.event(Event.RELEASE, now, reasons.hold_ended())
         elif self.mode == "READY" and holding and hand.pressed:
-            why = hold_refusal(replace(self.situation(None, None, now), not_theirs=not_theirs))
+            why = hold_refusal(replace(self.situation({}, now), not_theirs=not_theirs))
             if why is not None:
                 hand.refuse()
                 self._event_log.log(reasons.teleoperation_refused(why))

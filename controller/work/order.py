@@ -66,12 +66,15 @@ class WorkOrder:
         self._change(tuple(order), user)
         return None
 
+    @property
+    def reset_refused(self) -> Reason | None:
+        """Reason why there is no order by hand to reset; None if there is one."""
+        return None if self._by_hand else reasons.order_of_plan()
+
     def give_back(self, revision: int) -> Reason | None:
-        """Return to the plan's order. Returns the reason of a refusal; None if done."""
+        """Return from an order by hand to the plan's. Returns the reason of a refusal; None if done."""
         if why := self._outdated(revision):
             return why
-        if not self._by_hand:
-            return reasons.order_of_plan()
         self._change((), "")
         return None
 

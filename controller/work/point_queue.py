@@ -129,13 +129,22 @@ class PointQueue:
             return None
         return None if points.rule == before.rule else (before.rule, points.rule)
 
+    @property
+    def _rule(self) -> PruningRule | None:
+        return None if self.perceived is None else self.perceived.rule
+
+    @property
+    def undo_refused(self) -> Reason | None:
+        """Reason why the acceptances of no rule can be restored; None if those of one can."""
+        return self._rules.undo_refused(self._rule)
+
     def undo_rule(self, rule: PruningRule) -> Reason | None:
         """Restore the acceptances that the change to `rule` made void, now or when perception reports the former rule.
 
         Returns:
             Why that cannot be; None when it is done or will be.
         """
-        back = self._rules.undo(rule, None if self.perceived is None else self.perceived.rule)
+        back = self._rules.undo(rule, self._rule)
         if isinstance(back, Reason):
             return back
         self._restore(back)
@@ -169,6 +178,16 @@ class PointQueue:
             user: Who accepts.
             digest: Hash of what the operator saw; empty if not given.
         """
+        if (refused := self._acceptance_refused(point_id, revision, digest)) is not None:
+            return refused
+        ticket = self._tickets[point_id]
+        seen = ticket.point
+        self._put(
+            point_id, replace(ticket, state="ACCEPTED", reason=None, user=user, accepted=seen, hash=point_digest(seen))
+        )
+        return None
+
+    def _acceptance_refused(self, point_id: str, revision: int, digest: str) -> Reason | None:
         ticket = self._tickets.get(point_id)
         if ticket is None:
             return reasons.point_unknown(point_id)
@@ -187,13 +206,19 @@ class PointQueue:
         radius = ticket.point.radius
         if radius > self._config.largest_radius:
             return reasons.cane_too_thick(point_id, 2e3 * radius, 2e3 * self._config.largest_radius)
-        self._put(
-            point_id,
-            replace(
-                ticket, state="ACCEPTED", reason=None, user=user, accepted=ticket.point, hash=point_digest(ticket.point)
-            ),
-        )
         return None
+
+    def none_acceptable(self, confidence: float = 0.0) -> Reason | None:
+        """Reason why no proposed point that is at least this sure can be accepted; None if one can."""
+        refused = []
+        for point in self.proposed(confidence):
+            why = self._acceptance_refused(point.point_id, point.revision, point.digest)
+            if why is None:
+                return None
+            refused.append(why)
+        if refused:
+            return reasons.none_acceptable(len(refused), refused[0])
+        return reasons.none_so_confident(confidence) if self.proposed(0.0) else reasons.none_proposed()
 
     def reject(self, point_id: str, user: str, reason: str) -> Reason | None:
         """Reject a point. Returns the reason of a refusal; None if done."""

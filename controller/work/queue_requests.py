@@ -46,11 +46,9 @@ class QueueRequests:
         return handle
 
     def _accept_all(self, asked: intents.AcceptAll) -> Reason | None:
+        if (refused := self._queue.none_acceptable(asked.confidence)) is not None:
+            return refused
         points = self._queue.proposed(asked.confidence)
-        refused = [self._queue.accept(point.point_id, point.revision, asked.user, point.digest) for point in points]
-        why = [each for each in refused if each is not None]
-        if len(why) < len(points):
-            counted = len(points) - len(why)
-            self._event_log.log(reasons.points_accepted(asked.user, counted, asked.confidence))
-            return None
-        return reasons.none_acceptable(len(why), why[0]) if why else reasons.none_so_confident(asked.confidence)
+        answers = [self._queue.accept(point.point_id, point.revision, asked.user, point.digest) for point in points]
+        self._event_log.log(reasons.points_accepted(asked.user, answers.count(None), asked.confidence))
+        return None

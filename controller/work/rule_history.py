@@ -41,6 +41,10 @@ class RuleHistory(Generic[Acceptance]):
         self._changes = [*self._changes, Change(former, rule, voided)][-_MOST:]
         return None
 
+    def undo_refused(self, now: PruningRule | None) -> Reason | None:
+        """Reason why no change can be undone while `now` is in force; None if one can."""
+        return None if self._changes and self._changes[-1].rule == now else reasons.nothing_to_restore()
+
     def undo(self, rule: PruningRule, now: PruningRule | None) -> dict[str, Acceptance] | None | Reason:
         """Undo the change to `rule` while `now` is in force.
 
@@ -48,11 +52,13 @@ class RuleHistory(Generic[Acceptance]):
             The acceptances to restore at once; None if perception has not yet reported the former
             rule; or the reason why there is nothing to undo.
         """
+        if (refused := self.undo_refused(now)) is not None:
+            return refused
         changes = self._changes
-        if changes and changes[-1].rule == rule == now:
+        if changes[-1].rule == rule:
             self._coming = changes[-1]
             return None
-        if len(changes) > 1 and changes[-1].rule == now == changes[-2].former and changes[-2].rule == rule:
+        if len(changes) > 1 and changes[-2].former == now and changes[-2].rule == rule:
             # Perception's report came first; it looked like another change.
             voided = changes[-2].voided
             self._changes = changes[:-2]

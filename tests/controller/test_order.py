@@ -71,7 +71,7 @@ def test_what_cannot_be_moved_is_refused_and_changes_nothing():
     assert order.move("x", "", 0, "ada", NAMES) == reasons.not_in_order("x")
     assert order.move("a", "x", 0, "ada", NAMES) == reasons.not_in_order("x")
     assert order.move("a", "a", 0, "ada", NAMES) == reasons.before_itself("a")
-    assert order.give_back(0) == reasons.order_of_plan()
+    assert order.reset_refused == reasons.order_of_plan()
     assert order.state.revision == 0 and order.by_hand == ()
 
 
@@ -80,7 +80,7 @@ def test_the_plans_order_is_one_press_away():
     order.plan(tuple("fedcba"))
     order.move("a", "f", 0, "ada", tuple("fedcba"))
     assert order.arranged(NAMES, everything)[0] == "a"
-    assert order.give_back(1) is None
+    assert order.reset_refused is None and order.give_back(1) is None
     assert order.arranged(NAMES, everything) == list("fedcba")
 
 

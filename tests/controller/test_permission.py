@@ -1,4 +1,5 @@
 from dataclasses import replace
+from typing import get_args
 
 import msgspec
 
@@ -8,7 +9,8 @@ from controller.supervision import modes
 from controller.supervision.permission import Situation, allowed, of_holder, refusal
 from rolling_panda import commands as intents
 from rolling_panda import reasons
-from rolling_panda.commands import COMMAND_OF
+from rolling_panda.commands import COMMAND_OF, Condition
+from rolling_panda.messages.types import Reason
 from rolling_panda.transport.inbox import Inbox
 
 WELL = msgspec.structs.replace(
@@ -29,8 +31,13 @@ def well(**changes: object) -> safety.Health:
 
 def situation(mode: str = "READY", **changes: object) -> Situation:
     state = replace(modes.boot(), mode=mode)
-    usual = Situation(SupervisionConfig(), state, WELL, homing=False, busy=None, waits=None, rights=modes.OPERATOR)
+    usual = Situation(SupervisionConfig(), state, WELL, homing=False, busy=None, work=work(), rights=modes.OPERATOR)
     return replace(usual, **changes)
+
+
+def work(**missing: Reason) -> dict[str, Reason | None]:
+    """The conditions of the work; `missing` by names with underscores."""
+    return {name: missing.get(name.replace(" ", "_")) for name in get_args(Condition)}
 
 
 def test_a_ready_robot_with_work_may_start_and_go_home() -> None:
@@ -42,9 +49,9 @@ def test_a_ready_robot_with_work_may_start_and_go_home() -> None:
 
 def test_each_thing_that_is_missing_is_said() -> None:
     start, home = COMMAND_OF[intents.Start], COMMAND_OF[intents.Home]
-    missing = reasons.said("no point is accepted")
-    assert refusal(start, 0.0, situation(waits=missing)) == missing
-    assert refusal(home, 0.0, situation(waits=missing)) is None
+    missing = reasons.none_accepted()
+    assert refusal(start, 0.0, situation(work=work(workable_point=missing))) == missing
+    assert refusal(home, 0.0, situation(work=work(workable_point=missing))) is None
     assert refusal(start, 0.0, situation(busy=missing)) == missing
     limit = SupervisionConfig().perception_max_age_s
     silent = reasons.process_silent("perception", 9.0, limit)
@@ -125,7 +132,7 @@ def test_a_link_that_is_too_slow_for_a_hand_lets_work_begin_and_without_a_server
 
 
 def test_a_survey_needs_neither_accepted_points_nor_an_approved_preview() -> None:
-    for missing in ({"waits": reasons.said("nothing")}, {"approval": reasons.said("approve it")}):
-        (why,) = missing.values()
-        assert refusal(COMMAND_OF[intents.Start], 0.0, situation(**missing)) == why
-        assert refusal(COMMAND_OF[intents.Survey], 0.0, situation(**missing)) is None
+    why = reasons.preview_not_approved()
+    for missing in (work(workable_point=why), work(approved_preview=why)):
+        assert refusal(COMMAND_OF[intents.Start], 0.0, situation(work=missing)) == why
+        assert refusal(COMMAND_OF[intents.Survey], 0.0, situation(work=missing)) is None

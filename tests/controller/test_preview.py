@@ -189,8 +189,10 @@ def test_an_approval_that_expires_under_way_keeps_the_blades_from_closing(p):
 
 def test_there_is_nothing_to_preview_without_an_accepted_point(p):
     assert p.ask(intents.RequestPreview) == text_of(reasons.none_accepted())
-    assert "accept it first" in p.ask(intents.RequestPreview, point_id="a")
-    assert "no preview to approve" in p.ask(intents.ApprovePreview, preview_hash="")
+    assert p.ask(intents.RequestPreview, point_id="a") == text_of(reasons.none_accepted())
+    assert p.ask(intents.ApprovePreview, preview_hash="") == text_of(reasons.preview_missing())
+    assert p.ask(intents.AcceptPoint, point_id="b", revision=1) == ""
+    assert p.ask(intents.RequestPreview, point_id="a") == text_of(reasons.point_to_accept("a", "PROPOSED"))
 
 
 def test_what_was_required_is_required_after_a_restart(rolled):

@@ -141,7 +141,7 @@ def test_a_long_reason_of_a_reset_fits_the_wire():
 def test_before_the_bridge_has_said_what_it_holds_a_reset_is_refused_and_later_it_is_not_lost():
     latch = StopLatch()
     latch.update((stop("a"),), None)
-    assert latch.ask_release(RESET, None, 1.0) == reasons.stop_unknown()
+    assert latch.reset_refused(None, 1.0) == reasons.stop_unknown()
     assert not latch.released(None) and not latch.released(BRIDGE)
     assert latch.ask_release(RESET, bridge("a"), 1.1) is None
     assert latch.release_due().stop_id == "a"
@@ -179,5 +179,5 @@ def test_asking_again_is_possible_when_the_bridge_did_not_answer():
     latch = StopLatch()
     latch.update((stop("a"),), bridge("a"))
     latch.ask_release(RESET, bridge("a"), 1.0)
-    assert latch.ask_release(RESET, bridge("a"), 1.5) == reasons.reset_under_way()
+    assert latch.reset_refused(bridge("a"), 1.5) == reasons.reset_under_way()
     assert latch.ask_release(RESET, bridge("a"), 2.1) is None
