@@ -628,9 +628,9 @@ def point_worked_on(point: str) -> None:
 # Page
 
 
-@_reason("warning", "wait until the page has found it again")
+@_reason("error", "it is tried again by itself; until then use the emergency stop on the robot")
 def no_link() -> None:
-    """There is no link to the server."""
+    """This page has no link to the server."""
 
 
 @_reason("info", "wait")
@@ -701,6 +701,232 @@ def acceptance_stands(point: str) -> None:
 @_reason("info", "they can give it to you")
 def control_asked_by_you(user: str) -> None:
     """You have asked {user} for control."""
+
+
+# Page: alarms
+
+
+@_reason("error", "wait, or start it again; the robot stops without it")
+def server_silent() -> None:
+    """The server is silent."""
+
+
+@_reason("error", "if the robot moves, press its emergency stop; then start the bridge again")
+def bridge_gone() -> None:
+    """The bridge is gone, and nothing is known of the robot."""
+
+
+@_reason("error", "start it again; what is queued waits")
+def controller_gone() -> None:
+    """The controller is gone, and the robot has stopped by itself."""
+
+
+@_reason("warning", "start it again")
+def perception_gone() -> None:
+    """Perception is gone: nothing new is seen, and work pauses until it is back."""
+
+
+@_reason("error", "")
+def mode_stopped(cause: Reason) -> None:
+    """Stopped: {cause}."""
+
+
+@_reason("error", "")
+def mode_protective_stop(cause: Reason) -> None:
+    """Protective stop: {cause}."""
+
+
+@_reason("error", "")
+def mode_fault(cause: Reason) -> None:
+    """Fault: {cause}."""
+
+
+@_reason("warning", "")
+def mode_paused(cause: Reason) -> None:
+    """Paused: {cause}."""
+
+
+@_reason("warning", "")
+def work_waits() -> None:
+    """The work waits to be begun again."""
+
+
+@_reason("error", "press the robot's emergency stop, then free the blades by hand")
+def cutter_jammed() -> None:
+    """The cutter is jammed."""
+
+
+@_reason("error", "see the load of its computer, then start again")
+def commands_missing() -> None:
+    """The bridge gets no commands in time and holds the robot."""
+
+
+@_reason("error", "start the program again without --plain-wire")
+def wire_plain() -> None:
+    """The robot's wire is plain: every program on its machine can move it."""
+
+
+@_reason("warning", "if nobody means that, have the configuration changed back")
+def limits_relaxed(limits: str) -> None:
+    """Set wider than usual: {limits}."""
+
+
+@_reason("warning", "look at the plant, and say on the row whether it is cut")
+def cuts_unknown(cuts: float) -> None:
+    """Cuts that ended unknown: {cuts:.0f}."""
+
+
+@_reason("warning", "close other programs")
+def simulation_slow() -> None:
+    """The simulation is slower than real time."""
+
+
+@_reason("warning", "close other programs on the robot's computer")
+def control_late() -> None:
+    """Control periods come too late."""
+
+
+@_reason("warning", "leading the tool may end by itself")
+def page_link_slow() -> None:
+    """The link between this page and the server is slow."""
+
+
+@_reason("warning", "")
+def joint_near_limit() -> None:
+    """A joint of the arm is near its limit."""
+
+
+@_reason("warning", "")
+def arm_stretched() -> None:
+    """The arm is nearly stretched out."""
+
+
+# Page: steps out of an alarm
+
+
+@_reason("info", "")
+def ask_operator() -> None:
+    """Ask an operator to see to it."""
+
+
+@_reason("info", "")
+def release_first() -> None:
+    """Release the robot's own emergency stop first, once the row is clear."""
+
+
+@_reason("info", "")
+def check_row() -> None:
+    """See that the row is clear."""
+
+
+@_reason("info", "")
+def press_reset() -> None:
+    """Write why it is safe to go on; press Reset, then Arm."""
+
+
+@_reason("info", "")
+def supervisor_resets() -> None:
+    """A supervisor writes why it is safe to go on, and presses Reset, then Arm."""
+
+
+@_reason("info", "")
+def mend_cause() -> None:
+    """Mend the cause, and wait until it has been gone for a second."""
+
+
+@_reason("info", "")
+def cause_gone() -> None:
+    """The cause has gone."""
+
+
+@_reason("info", "")
+def acknowledge_resume() -> None:
+    """Press Acknowledge, then Resume."""
+
+
+@_reason("info", "")
+def acknowledge_arm() -> None:
+    """Press Acknowledge, then Arm."""
+
+
+@_reason("info", "")
+def supervisor_acknowledges() -> None:
+    """A supervisor presses Acknowledge, then Arm."""
+
+
+@_reason("info", "")
+def press_resume() -> None:
+    """When that is seen to, press Resume."""
+
+
+@_reason("info", "")
+def hold_again() -> None:
+    """Hold again to go on."""
+
+
+@_reason("info", "")
+def survey_on() -> None:
+    """Press Survey to look on."""
+
+
+@_reason("info", "")
+def survey_on_or_start() -> None:
+    """Press Survey to look on, or Start to cut."""
+
+
+@_reason("info", "")
+def press_survey() -> None:
+    """Press Survey to find points."""
+
+
+@_reason("info", "")
+def accept_start() -> None:
+    """Accept points, then press Start."""
+
+
+@_reason("info", "")
+def press_start() -> None:
+    """Press Start to go on."""
+
+
+@_reason("info", "")
+def approve_start() -> None:
+    """Press Approve and Start to go on."""
+
+
+@_reason("info", "")
+def preview_start() -> None:
+    """Press Preview, Approve and Start to go on."""
+
+
+@_reason("info", "")
+def robot_leads_back() -> None:
+    """Nothing yet: the robot leads itself back. If it does not, press Pause, then Resume and Home."""
+
+
+@_reason("info", "")
+def lead_back() -> None:
+    """Lead the tool back towards the base; or let go, and press Home."""
+
+
+@_reason("info", "")
+def press_home() -> None:
+    """Press Home, or lead the tool back towards the base."""
+
+
+@_reason("info", "")
+def resume_home() -> None:
+    """Press Resume, then Home."""
+
+
+@_reason("info", "")
+def arm_and_home() -> None:
+    """Press Arm, then Home."""
+
+
+@_reason("info", "")
+def home_when_ready() -> None:
+    """Once the robot is ready again, press Home."""
 
 
 # Server
@@ -1051,9 +1277,9 @@ def robot_unseen() -> None:
     """Not seen yet."""
 
 
-@_reason("error", "release it, then reset")
+@_reason("error", "release it there once the row is clear, then reset")
 def emergency_stop_pressed() -> None:
-    """Emergency stop on the robot is pressed."""
+    """The emergency stop on the robot is pressed."""
 
 
 @_reason("error", "")

@@ -56,6 +56,9 @@ def test_every_code_is_made_by_the_product():
 def test_the_page_makes_only_reasons_of_the_catalogue_with_all_of_their_values():
     made = made_by_page()
     assert "no_link" in made
+    scripts = [path.read_text(encoding="utf-8") for path in (ROOT / "web").rglob("*.js")]
+    # Not by a variable, which would be found neither here nor by a search. One is the function itself.
+    assert sum(len(re.findall(r'\breason\((?!")', script)) for script in scripts) == 1
     for code, values in made.items():
         assert values == values_of(code), code
 

@@ -124,6 +124,8 @@ class PlayedServer:
     control: ControlState | None = None
     stopped: tuple[StopState, ...] = ()
     replay: ReplayState | None = None
+    plain_wire: bool = False
+    relaxed_limits: tuple[str, ...] = ()
     online: bool = True
     silent: bool = False
     #: How long ago it heard each process, where none is gone (s).
@@ -228,6 +230,8 @@ class PlayedServer:
             stops=self.stopped,
             speed_ratios=(0.2, 0.1, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0),
             replay=self.replay,
+            plain_wire=self.plain_wire,
+            relaxed_limits=self.relaxed_limits,
         )
 
     def page_points(self) -> page_messages.PagePoints:

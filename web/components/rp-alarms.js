@@ -2,6 +2,7 @@
 
 import { clockWords, counted } from "../js/state/format.js";
 import { link, now, pageState, points } from "../js/state/page-state.js";
+import { partsOf, reasonText, severityOf } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
 import { alarms } from "../js/views/alarms.js";
 import { element, setText } from "../js/views/dom.js";
@@ -18,24 +19,26 @@ class RpAlarms extends HTMLElement {
     const live = element("div", { class: "live", attributes: { role: "log", "aria-live": "assertive" } }, list);
     const empty = element("p", { class: "empty" }, element("span", { class: "calm" }, icon("present"), "No alarms"));
     this.append(element("div", { class: "panel-head" }, element("h2", { text: "Alarms" }), count), live, empty);
-    /** @type {Map<string, { row: HTMLElement, text: Element, act: Element, seen: number }>} */
+    /** @type {Map<string, { row: HTMLElement, text: Element, act: HTMLElement, seen: number }>} */
     const rows = new Map();
     drawOn([now, pageState, points, link], () => {
       const found = alarms();
       const at = performance.now();
-      for (const each of found) {
-        const known = rows.get(each.id) ?? newRow(each.severity);
-        rows.set(each.id, known);
+      for (const { reason, steps } of found) {
+        const known = rows.get(reason.code) ?? newRow(reason);
+        rows.set(reason.code, known);
         known.seen = at;
-        setText(known.text, each.text);
-        setText(known.act, each.act);
+        const { text, act } = partsOf(reason);
+        setText(known.text, text);
+        setText(known.act, [act, ...steps.map(reasonText)].filter(Boolean).map(sentence).join(" "));
+        known.act.dataset.steps = steps.map((step) => step.code).join(" ");
       }
-      for (const [id, { row, seen }] of rows) {
+      for (const [code, { row, seen }] of rows) {
         // Its advice is hidden.
         row.classList.toggle("gone", seen < at);
         if (at - seen < LINGER_MS) continue;
         row.remove();
-        rows.delete(id);
+        rows.delete(code);
       }
       let previous = /** @type {Element|null} */ (null);
       for (const { row } of [...rows.values()].sort((a, b) => rank(a.row) - rank(b.row))) {
@@ -46,7 +49,7 @@ class RpAlarms extends HTMLElement {
         previous = row;
       }
       empty.hidden = rows.size > 0;
-      this.dataset.worst = found[0]?.severity ?? "";
+      this.dataset.worst = found[0] ? severityOf(found[0].reason) : "";
       setText(count, rows.size > 0 ? counted(rows.size, "alarm") : "");
     });
   }
@@ -57,14 +60,20 @@ function rank(row) {
   return Number(row.dataset.severity === "warning");
 }
 
-/** @param {"error"|"warning"} severity */
-function newRow(severity) {
+/** @param {string} words */
+function sentence(words) {
+  return `${words.charAt(0).toUpperCase()}${words.slice(1)}.`;
+}
+
+/** @param {import("../js/state/reasons.js").Reason} reason */
+function newRow(reason) {
+  const severity = severityOf(reason);
   const text = element("strong");
   const act = element("span", { class: "act" });
   const since = element("time", { text: clockWords(Date.now() / 1000), attributes: { title: "Since" } });
   const row = element(
     "li",
-    { data: { severity } },
+    { data: { severity, code: reason.code } },
     icon(severity),
     element("span", { class: "alarm-words" }, text, act),
     since,

@@ -4,7 +4,7 @@ import { counted } from "../js/state/format.js";
 import { isLive, link, now, pageState, staleWords } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
 import { element, panelHead, setText, svg } from "../js/views/dom.js";
-import { READINGS } from "../js/views/readings.js";
+import { READINGS, beyondLimit } from "../js/views/readings.js";
 import { drawerButton } from "./rp-drawer.js";
 
 /** @typedef {import("../js/views/readings.js").Reading} Reading */
@@ -52,10 +52,9 @@ class RpGauge extends HTMLElement {
     setText(this.value, value === null ? "–" : kind.format(value));
     const fraction = value === null ? 0 : Math.min(1, Math.max(0, value / kind.fullScale));
     this.fill.style.setProperty("width", `${(100 * fraction).toFixed(1)}%`);
-    const low = value !== null && kind.warnBelow !== undefined && value < kind.warnBelow;
-    const high = value !== null && kind.warnAbove !== undefined && value > kind.warnAbove;
-    this.dataset.warning = low ? "low" : high ? "high" : "";
-    setText(this.warning, low ? "▾ low" : high ? "▴ high" : "");
+    const side = beyondLimit(kind, value);
+    this.dataset.warning = side;
+    setText(this.warning, side === "low" ? "▾ low" : side === "high" ? "▴ high" : "");
     this.setAttribute("aria-valuetext", value === null ? "unknown" : `${kind.format(value)} ${kind.unit}`);
     this.setAttribute("aria-valuenow", value === null ? "0" : String(Math.min(kind.fullScale, Math.max(0, value))));
   }

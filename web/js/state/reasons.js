@@ -33,19 +33,38 @@ export function keyOf(why) {
 }
 
 /**
- * English text of a reason, with what to do; empty without one. A code that this page does not know is shown with its
- * values.
+ * Severity of a reason; a warning where this page does not know its code.
+ *
+ * @param {Reason} reason
+ */
+export function severityOf({ code }) {
+  return REASONS[code]?.[0] ?? "warning";
+}
+
+/**
+ * Text of a reason, and what to do. A code that this page does not know is shown with its values.
+ *
+ * @param {Reason} reason
+ * @returns {{ text: string, act: string }}
+ */
+export function partsOf({ code, values = [] }) {
+  const entry = REASONS[code];
+  if (!entry) return { text: [code, ...values.map(([name, value]) => `${name} ${shown(value, "")}`)].join(", "), act: "" };
+  const [, template, act] = entry;
+  const known = new Map(values);
+  const text = template.replace(/\{(\w+)(?::([^}]*))?\}/g, (_, name, format) => shown(known.get(name), format ?? ""));
+  return { text, act };
+}
+
+/**
+ * Text of a reason, with what to do; empty without one.
  *
  * @param {Reason|null|undefined} reason
  * @returns {string}
  */
 export function reasonText(reason) {
   if (!reason) return "";
-  const entry = REASONS[reason.code];
-  const values = new Map(reason.values);
-  if (!entry) return [reason.code, ...[...values].map(([name, value]) => `${name} ${shown(value, "")}`)].join(", ");
-  const [, template, act] = entry;
-  const text = template.replace(/\{(\w+)(?::([^}]*))?\}/g, (_, name, format) => shown(values.get(name), format ?? ""));
+  const { text, act } = partsOf(reason);
   return act ? `${text}: ${act}` : text;
 }
 

@@ -1,33 +1,29 @@
-// Alarms: severity, text, and what to do. Advice names only buttons that can be pressed.
+// The alarms now: which are present, and the steps that lead out of each. Their words are in the catalogue of reasons.
+// A step names only buttons that can be pressed.
 
 import { countOf } from "../control/allowed.js";
 import { holder } from "../control/lease.js";
 import { hardwareStopPressed } from "../control/stop.js";
-import { counted } from "../state/format.js";
-import { isGone, isLive, isOpening, link, pageState, points, preview, staleWords } from "../state/page-state.js";
-import { reasonText } from "../state/reasons.js";
+import { isGone, isLive, isOpening, link, pageState, preview } from "../state/page-state.js";
+import { reason, severityOf } from "../state/reasons.js";
 import { history } from "./history.js";
+import { READINGS, beyondLimit } from "./readings.js";
 
 /** @typedef {import("../link/messages.js").ControllerState} ControllerState */
 /** @typedef {import("../link/messages.js").PageState} PageState */
+/** @typedef {import("../state/reasons.js").Reason} Reason */
 
-/** @typedef {{ id: string, severity: "error"|"warning", text: string, act: string }} Alarm */
+/**
+ * What to do is the advice of its reason, then these steps.
+ *
+ * @typedef {{ reason: Reason, steps: readonly Reason[] }} Alarm
+ */
 
-const DEGREE = 180 / Math.PI;
-/** Longest round trip for teleoperation (ms). */
-const SLOW_MS = 200;
-/** Consecutive samples (3 s), since loading the 3-D view is slow for a moment. */
+/** Consecutive slow samples (3 s), since loading the 3-D view is slow for a moment. */
 const SLOW_SAMPLES = 12;
 /** Ratio of late control periods, over this many samples (10 s). */
 const LATE_SHARE = 0.02;
 const LATE_SAMPLES = 40;
-
-/** @type {Readonly<Record<string, string>>} */
-const GONE = Object.freeze({
-  bridge: "Nothing is known of the robot now. If it moves, press its emergency stop; then start the bridge again.",
-  controller: "The robot has stopped by itself. Start the controller again; what is queued waits.",
-  perception: "Nothing new is seen. Work pauses until it is back: start perception again.",
-});
 
 /**
  * All alarms now, errors first.
@@ -36,271 +32,202 @@ const GONE = Object.freeze({
  */
 export function alarms() {
   const state = pageState.get();
-  const found = link.get().status === "open" || isOpening() ? [] : [noLink()];
-  if (state !== null && found.length === 0) found.push(...ofProcesses(), ...ofModes(state), ...ofWork(state));
-  return found.sort((a, b) => Number(a.severity === "warning") - Number(b.severity === "warning"));
+  const lost = link.get().status !== "open" && !isOpening();
+  const found = lost ? [alarm(reason("no_link"))] : state === null ? [] : ofRobot(state);
+  return found.sort((a, b) => Number(isWarning(a)) - Number(isWarning(b)));
 }
 
-/** @returns {Alarm} */
-function noLink() {
-  return alarm(
-    "link",
-    "error",
-    "This page has no link to the server",
-    "It tries again by itself. Until then use the emergency stop on the robot.",
-  );
+/** @param {Alarm} each */
+function isWarning(each) {
+  return severityOf(each.reason) !== "error";
+}
+
+/**
+ * @param {Reason} why
+ * @param {readonly Reason[]} [steps]
+ * @returns {Alarm}
+ */
+function alarm(why, steps = []) {
+  return { reason: why, steps };
+}
+
+/** @param {PageState} state */
+function ofRobot(state) {
+  return [...ofProcesses(), ...ofMode(state), ...ofDevices(state), ...ofSettings(state), ...ofWork(), ...ofReadings(state)];
+}
+
+/** A silent server says nothing about the others. */
+function ofProcesses() {
+  if (!isLive("server")) return [alarm(reason("server_silent"))];
+  return [
+    ...when(isGone("bridge"), reason("bridge_gone")),
+    ...when(isGone("controller"), reason("controller_gone")),
+    ...when(isGone("perception"), reason("perception_gone")),
+  ];
+}
+
+/**
+ * @param {boolean|undefined} present
+ * @param {Reason} why
+ */
+function when(present, why) {
+  return present ? [alarm(why)] : [];
+}
+
+/** @param {PageState} state */
+function ofMode({ controller }) {
+  if (controller === null) return [];
+  const { mode, reason: cause } = controller;
+  switch (mode) {
+    case "ESTOP_LATCHED":
+      return [alarm(reason("mode_stopped", { cause }), afterStop())];
+    case "PROTECTIVE_STOP":
+      return [alarm(reason("mode_protective_stop", { cause }), afterProtectiveStop(controller))];
+    case "FAULT":
+      return [alarm(reason("mode_fault", { cause }), afterFault(controller))];
+    case "PAUSED":
+      return [alarm(reason("mode_paused", { cause }), byOperator(reason("press_resume"), next(controller)))];
+    case "READY": {
+      // Takes the place of "Paused": Resume alone starts nothing.
+      const waits = controller.interrupted === "work" && countOf("ACCEPTED") > 0;
+      return waits ? [alarm(reason("work_waits"), byOperator(next(controller)))] : [];
+    }
+    default:
+      return [];
+  }
+}
+
+/** @param {PageState} state */
+function ofDevices(state) {
+  const { bridge, controller } = state;
+  const atWork = controller?.mode === "AUTO" || controller?.mode === "TELEOP";
+  return [
+    ...when(hardwareStopPressed(state), reason("emergency_stop_pressed")),
+    ...when(bridge?.cutter === "jammed", reason("cutter_jammed")),
+    ...when(bridge?.watchdog && atWork && isLive("controller"), reason("commands_missing")),
+  ];
+}
+
+/** @param {PageState} state */
+function ofSettings({ relaxed_limits, plain_wire }) {
+  return [
+    ...when(plain_wire, reason("wire_plain")),
+    ...when(relaxed_limits.length > 0, reason("limits_relaxed", { limits: relaxed_limits.join("; ") })),
+  ];
+}
+
+function ofWork() {
+  const cuts = countOf("UNKNOWN");
+  return when(cuts > 0, reason("cuts_unknown", { cuts }));
+}
+
+/** @param {PageState} state */
+function ofReadings(state) {
+  const { bridge, controller } = state;
+  const simulated = bridge?.kind === "sim" && isLive("bridge");
+  const found = [
+    ...when(simulated && isBeyond("real-time-factor", state), reason("simulation_slow")),
+    ...when(isSlow(), reason("page_link_slow")),
+  ];
+  if (!controller || !isLive("controller")) return found;
+  found.push(...when(lateShare() > LATE_SHARE, reason("control_late")));
+  if (isBeyond("joint-margin", state)) found.push(alarm(reason("joint_near_limit"), awayFromLimit(controller)));
+  if (isBeyond("manipulability", state)) found.push(alarm(reason("arm_stretched"), awayFromLimit(controller)));
+  return found;
 }
 
 /**
  * @param {string} id
- * @param {"error"|"warning"} severity
- * @param {string} text
- * @param {string} act
- * @returns {Alarm}
- */
-function alarm(id, severity, text, act) {
-  return { id, severity, text, act };
-}
-
-/** @returns {Alarm[]} */
-function ofProcesses() {
-  if (!isLive("server"))
-    return [alarm("server", "error", "The server is silent", "Wait, or start it again; the robot stops without it.")];
-  return /** @type {const} */ (["bridge", "controller", "perception"])
-    .filter(isGone)
-    .map((process) =>
-      alarm(process, process === "perception" ? "warning" : "error", staleWords(process), GONE[process] ?? ""),
-    );
-}
-
-/**
  * @param {PageState} state
- * @returns {Alarm[]}
  */
-function ofModes({ controller, bridge, stops }) {
-  const found = [];
-  if (stops.some((stop) => stop.hardware)) {
-    found.push(
-      alarm(
-        "hardware",
-        "error",
-        "The emergency stop on the robot is pressed",
-        "Release it there once the row is clear, then reset here.",
-      ),
-    );
-  }
-  const reason = controller ? `: ${reasonText(controller.reason)}` : "";
-  switch (controller?.mode) {
-    case "ESTOP_LATCHED":
-      found.push(alarm("stopped", "error", `Stopped${reason}`, afterStop()));
-      break;
-    case "PROTECTIVE_STOP":
-      found.push(alarm("protective", "error", `Protective stop${reason}`, afterProtectiveStop(controller)));
-      break;
-    case "PAUSED":
-      found.push(alarm("paused", "warning", `Paused${reason}`, afterPause(controller)));
-      break;
-    case "FAULT":
-      found.push(alarm("fault", "error", `Fault${reason}`, afterFault(controller)));
-      break;
-    case "READY":
-      // Takes the place of "Paused": Resume alone starts nothing.
-      if (waitingWork(controller))
-        found.push(alarm("paused", "warning", "The work waits to be begun again", waitingWork(controller)));
-      break;
-  }
-  if (bridge?.cutter === "jammed") {
-    found.push(
-      alarm(
-        "jammed",
-        "error",
-        "The cutter is jammed",
-        "Press the robot's emergency stop, then free the blades by hand.",
-      ),
-    );
-  }
-  const atWork = controller?.mode === "AUTO" || controller?.mode === "TELEOP";
-  if (bridge?.watchdog && atWork && isLive("controller")) {
-    found.push(
-      alarm(
-        "watchdog",
-        "error",
-        "The bridge gets no commands in time and holds the robot",
-        "See the load of its computer, then start again.",
-      ),
-    );
-  }
-  return found;
+function isBeyond(id, state) {
+  const reading = READINGS.find((each) => each.id === id);
+  return reading !== undefined && beyondLimit(reading, reading.read(state)) !== "";
 }
 
-/**
- * @param {PageState} state
- * @returns {Alarm[]}
- */
-function ofWork({ controller, bridge, relaxed_limits, plain_wire }) {
-  const found = [];
-  if (plain_wire) {
-    found.push(
-      alarm(
-        "plain",
-        "error",
-        "The robot's wire is plain: every program on its machine can move it",
-        "Start the program again without --plain-wire.",
-      ),
-    );
-  }
-  if (relaxed_limits.length > 0) {
-    found.push(
-      alarm(
-        "wider",
-        "warning",
-        `Set wider than usual: ${relaxed_limits.join("; ")}`,
-        "If nobody means that, have the configuration changed back.",
-      ),
-    );
-  }
-  const unknown = points.get()?.points.filter((row) => row.entry.state === "UNKNOWN").length ?? 0;
-  if (unknown > 0) {
-    found.push(
-      alarm(
-        "unknown",
-        "warning",
-        `${counted(unknown, "cut")} ended unknown`,
-        "Look at the plant, and say on the row whether it is cut.",
-      ),
-    );
-  }
-  if (bridge && isLive("bridge") && bridge.real_time_factor < 0.9 && bridge.kind === "sim") {
-    found.push(alarm("slow", "warning", "The simulation is slower than real time", "Close other programs."));
-  }
-  if (controller && isLive("controller")) {
-    if (lateShare() > LATE_SHARE) {
-      found.push(
-        alarm("late", "warning", "Control periods come too late", "Close other programs on the robot's computer."),
-      );
-    }
-    if (controller.joint_margin * DEGREE < 5) {
-      found.push(alarm("margin", "warning", "A joint of the arm is near its limit", awayFromLimit(controller)));
-    }
-    if (controller.manipulability < 0.02) {
-      found.push(alarm("singular", "warning", "The arm is nearly stretched out", awayFromLimit(controller)));
-    }
-  }
+/** Is the link between this page and the server slow? */
+function isSlow() {
+  const reading = READINGS.find((each) => each.id === "page-round-trip");
   const trips = history.of("page-round-trip").slice(-SLOW_SAMPLES);
-  if (trips.length === SLOW_SAMPLES && trips.every((trip) => trip.value > SLOW_MS)) {
-    found.push(
-      alarm(
-        "trip",
-        "warning",
-        "The link between this page and the server is slow",
-        "Leading the tool may end by itself.",
-      ),
-    );
-  }
-  return found;
+  return trips.length === SLOW_SAMPLES && trips.every(({ value }) => reading && beyondLimit(reading, value) === "high");
 }
 
 /** Ratio of late control periods in the last seconds. */
 function lateShare() {
-  const late = history.of("late-ticks").slice(-LATE_SAMPLES);
-  const ticks = history.of("ticks").slice(-LATE_SAMPLES);
-  const grown = (/** @type {typeof late} */ samples) => (samples.at(-1)?.value ?? 0) - (samples[0]?.value ?? 0);
-  return grown(ticks) > 0 ? grown(late) / grown(ticks) : 0;
+  const ticks = grown("ticks");
+  return ticks > 0 ? grown("late-ticks") / ticks : 0;
 }
 
-const NOT_MENDED = "Mend the cause. A second after it has gone";
+/** @param {string} id Of a count, which is unknown while its process is gone. */
+function grown(id) {
+  const known = history.of(id).slice(-LATE_SAMPLES).filter(({ value }) => !Number.isNaN(value));
+  return (known.at(-1)?.value ?? 0) - (known[0]?.value ?? 0);
+}
 
-/** @param {ControllerState} controller In PAUSED. */
-function afterPause({ interrupted }) {
-  return `${control()}When that is seen to, ${press("Resume")}, then ${goOn(interrupted)}.`;
+/**
+ * Steps of somebody who has to be in control first.
+ *
+ * @param {...Reason} steps
+ */
+function byOperator(...steps) {
+  if (pageState.get()?.role === "viewer") return [reason("ask_operator")];
+  const { held, mine, user } = holder();
+  return held && !mine ? [reason("control_held", { user }), ...steps] : steps;
+}
+
+function isSupervisor() {
+  return pageState.get()?.role === "supervisor";
+}
+
+function afterStop() {
+  if (hardwareStopPressed(pageState.get())) return [reason("release_first")];
+  return [reason("check_row"), isSupervisor() ? reason("press_reset") : reason("supervisor_resets")];
 }
 
 /** @param {ControllerState} controller In PROTECTIVE_STOP. */
 function afterProtectiveStop({ allowed }) {
-  const mended = allowed.Acknowledge === null;
-  return `${control()}${mended ? "The cause has gone:" : `${NOT_MENDED},`} ${press("Acknowledge")}, then Resume.`;
+  return byOperator(mended(allowed), reason("acknowledge_resume"));
 }
 
-/** @param {ControllerState} controller In FAULT. */
+/** @param {ControllerState} controller In FAULT, where nobody has to be in control. */
 function afterFault({ allowed }) {
-  const mended = allowed.Acknowledge === null;
-  return `${mended ? "The cause has gone:" : `${NOT_MENDED},`} ${ofSupervisor("Acknowledge")}, then Arm.`;
+  return [mended(allowed), isSupervisor() ? reason("acknowledge_arm") : reason("supervisor_acknowledges")];
 }
 
-function afterStop() {
-  if (hardwareStopPressed(pageState.get()))
-    return "Release the robot's own emergency stop first, once the row is clear.";
-  return `See that the row is clear and write why it is safe to go on; ${ofSupervisor("Reset")}, then Arm.`;
+/** @param {ControllerState["allowed"]} allowed */
+function mended(allowed) {
+  return allowed["Acknowledge"] === null ? reason("cause_gone") : reason("mend_cause");
 }
 
 /**
- * Advice for work that was interrupted, after Resume; empty if none waits.
+ * How to go on with what was interrupted.
  *
  * @param {ControllerState} controller
  */
-function waitingWork({ mode, interrupted }) {
-  if (mode !== "READY" || interrupted !== "work" || countOf("ACCEPTED") === 0) return "";
-  return `${control()}${capital(press(goOn("work")))} to go on.`;
+function next({ interrupted }) {
+  const accepted = countOf("ACCEPTED") > 0;
+  if (interrupted === "teleoperation") return reason("hold_again");
+  if (interrupted === "survey") return accepted ? reason("survey_on_or_start") : reason("survey_on");
+  if (!accepted) return countOf("PROPOSED") > 0 ? reason("accept_start") : reason("press_survey");
+  const told = preview.get();
+  if (!told?.required || told.phase === "approved") return reason("press_start");
+  return told.phase === "ready" ? reason("approve_start") : reason("preview_start");
 }
 
 /** @param {ControllerState} controller */
 function awayFromLimit({ mode }) {
   switch (mode) {
     case "AUTO":
-      return "Nothing yet: the robot leads itself back. If it does not, press Pause, then Resume and Home.";
+      return [reason("robot_leads_back")];
     case "TELEOP":
-      return "Lead the tool back towards the base; or let go, and press Home.";
+      return [reason("lead_back")];
     case "READY":
-      return `${control()}${capital(press("Home"))}, or lead the tool back towards the base.`;
+      return byOperator(reason("press_home"));
     case "PAUSED":
-      return `${control()}${capital(press("Resume"))}, then Home.`;
+      return byOperator(reason("resume_home"));
     case "IDLE":
-      return `${control()}${capital(press("Arm"))}, then Home.`;
+      return byOperator(reason("arm_and_home"));
     default:
-      return "Once the robot is ready again, press Home.";
+      return [reason("home_when_ready")];
   }
-}
-
-/** First step while another person holds control. */
-function control() {
-  const { held, mine, user } = holder();
-  return held && !mine && !viewing() ? `${user} holds control: press Ask or Take. ` : "";
-}
-
-/** @param {string} button */
-function press(button) {
-  return viewing() ? `an operator presses ${button}` : `press ${button}`;
-}
-
-/** @param {string} button */
-function ofSupervisor(button) {
-  return pageState.get()?.role === "supervisor" ? `press ${button}` : `a supervisor presses ${button}`;
-}
-
-/**
- * How to continue what was interrupted.
- *
- * @param {import("../link/messages.js").Interrupted} what
- */
-function goOn(what) {
-  const accepted = countOf("ACCEPTED") > 0;
-  if (what === "teleoperation") return "hold again";
-  if (what === "survey") return accepted ? "Survey to look on, or Start to cut" : "Survey to look on";
-  if (!accepted) return countOf("PROPOSED") > 0 ? "accept points, then Start" : "Survey";
-  return startAfterPreview();
-}
-
-function startAfterPreview() {
-  const told = preview.get();
-  if (!told?.required || told.phase === "approved") return "Start";
-  return told.phase === "ready" ? "Approve and Start" : "Preview, Approve and Start";
-}
-
-function viewing() {
-  return pageState.get()?.role === "viewer";
-}
-
-/** @param {string} words */
-function capital(words) {
-  return words.charAt(0).toUpperCase() + words.slice(1);
 }

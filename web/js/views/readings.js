@@ -190,6 +190,19 @@ export const READINGS = Object.freeze([
 ]);
 
 /**
+ * On which side of its limits a reading is.
+ *
+ * @param {Reading} reading
+ * @param {number|null} value In the unit shown; null when unknown.
+ * @returns {"low"|"high"|""}
+ */
+export function beyondLimit({ warnBelow, warnAbove }, value) {
+  if (value === null) return "";
+  if (warnBelow !== undefined && value < warnBelow) return "low";
+  return warnAbove !== undefined && value > warnAbove ? "high" : "";
+}
+
+/**
  * @param {number|undefined} value
  * @param {number} factor
  */
