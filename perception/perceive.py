@@ -20,7 +20,15 @@ from perception.config import PerceptionConfig, RuleConfig
 from perception.pipeline import with_width_bias
 from perception.segmentation.network_segmenter import NetworkSegmenter
 from perception.segmentation.segmenter import SHIPPED
-from perception.single_image import R_LEVEL, ImageCut, ImageResult, Photograph, find_cuts, load_photograph
+from perception.single_image import (
+    R_LEVEL,
+    ImageCut,
+    ImageResult,
+    Photograph,
+    find_cuts,
+    load_photograph,
+    segment_photograph,
+)
 from rolling_panda.errors import InputError, RollingPandaError
 from rolling_panda.messages.types import WOOD_CLASSES
 from rolling_panda.reasons import text_of
@@ -61,9 +69,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         rule = _rule(arguments.system, arguments.nodes_kept, arguments.offset)
         if not arguments.depth_unit > 0.0:
             raise InputError(f"--depth-unit {arguments.depth_unit}: give the metres a count, more than 0")
-        photograph = load_photograph(arguments.image, arguments.depth, arguments.intrinsics, arguments.depth_unit)
+        whole = load_photograph(arguments.image, arguments.depth, arguments.intrinsics, arguments.depth_unit)
         segmenter = NetworkSegmenter(arguments.weights or resource(SHIPPED))
-        labels = segmenter.classify(photograph.color, photograph.depth)
+        photograph, (labels, _) = segment_photograph(whole, segmenter)
         config = with_width_bias(replace(PerceptionConfig(), rule=rule), segmenter.width_bias)
         result = find_cuts(photograph, labels, config)
         arguments.out.mkdir(parents=True, exist_ok=True)

@@ -1,7 +1,9 @@
 """Pruning points of a single photograph, without a robot: with depth in metres, without depth in pixels."""
 
 from dataclasses import dataclass
+from dataclasses import replace as replace_field
 from pathlib import Path
+from typing import Protocol
 
 import msgspec
 import numpy as np
@@ -22,8 +24,11 @@ from rolling_panda.errors import InputError
 from rolling_panda.messages.robot import Intrinsics
 from rolling_panda.messages.types import Reason
 
-#: Wider photographs are scaled down to this, the width of the training images; smallest width and height (px).
-MAX_WIDTH, _MIN_SIZE = 848, 64
+#: Width at which canes are first looked for, the width of the training images; greatest width that is segmented;
+#: smallest width and height (px).
+FIRST_WIDTH, _MAX_WIDTH, _MIN_SIZE = 848, 1920, 64
+#: Median width of canes up to which a larger image shows more (px).
+_WIDE_CANE = 12.0
 #: Horizontal field of view without intrinsics (degrees): the colour camera of a RealSense D435i.
 _DEFAULT_FIELD_OF_VIEW = 69.0
 #: Plausible median depth (m).
@@ -42,12 +47,12 @@ R_LEVEL = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 
 @dataclass(frozen=True)
 class Photograph:
-    """A photograph, scaled for the network.
+    """A photograph, as its file has it or scaled for the network.
 
     Attributes:
         color: H×W×3, RGB.
         depth: H×W (m), 0 = invalid; or None.
-        intrinsics: Of the scaled images.
+        intrinsics: Of these images.
         assumed: Whether the intrinsics are a default.
         size: Width and height of the file's image (px).
     """
@@ -58,9 +63,38 @@ class Photograph:
     assumed: bool
     size: tuple[int, int]
 
+    def scaled(self, width: int) -> "Photograph":
+        """The photograph scaled down to a width (px); itself where it is not wider."""
+        own_height, own_width = self.color.shape[:2]
+        if own_width <= width:
+            return self
+        scale = width / own_width
+        height = round(own_height * scale)
+        color = np.asarray(Image.fromarray(self.color).resize((width, height), Image.Resampling.BOX))
+        depth = self.depth
+        if depth is not None:
+            # Nearest neighbour: a mean of foreground and background depth is meaningless.
+            rows = ((np.arange(height) + 0.5) / scale).astype(int).clip(max=own_height - 1)
+            cols = ((np.arange(width) + 0.5) / scale).astype(int)
+            depth = np.ascontiguousarray(depth[rows][:, cols])
+        k = self.intrinsics
+        k = Intrinsics(
+            width, height, k.fx * scale, k.fy * scale, (k.cx + 0.5) * scale - 0.5, (k.cy + 0.5) * scale - 0.5
+        )
+        return replace_field(self, color=color, depth=depth, intrinsics=k)
+
     def view(self, depth: NDArray[np.float32]) -> View:
         """As a frame of a level camera at the origin, with the given depth."""
         return View(0, 0.0, self.intrinsics, depth, None, b"", R_LEVEL, np.zeros(3))
+
+
+class SureSegmenter(Protocol):
+    """Tells classes and how sure they are; `NetworkSegmenter` does."""
+
+    def classify_surely(
+        self, color: NDArray[np.uint8], depth: NDArray[np.float32] | None
+    ) -> tuple[Labels, NDArray[np.float32] | None]:
+        """H×W classes of a colour image (H×W×3) with depth (H×W, m) or without, and their probabilities or None."""
 
 
 def load_photograph(
@@ -83,19 +117,40 @@ def load_photograph(
         raise InputError(f"{image} is {size[0]}×{size[1]} pixels; at least {_MIN_SIZE}×{_MIN_SIZE} are needed")
     metres = None if depth is None else _depth(depth, size, depth_unit)
     k = _default_intrinsics(size) if intrinsics is None else _intrinsics(intrinsics, size)
-    if size[0] > MAX_WIDTH:
-        scale = MAX_WIDTH / size[0]
-        height = round(size[1] * scale)
-        color = np.asarray(Image.fromarray(color).resize((MAX_WIDTH, height), Image.Resampling.BOX))
-        if metres is not None:
-            # Nearest neighbour: a mean of foreground and background depth is meaningless.
-            rows = ((np.arange(height) + 0.5) / scale).astype(int).clip(max=size[1] - 1)
-            cols = ((np.arange(MAX_WIDTH) + 0.5) / scale).astype(int)
-            metres = np.ascontiguousarray(metres[rows][:, cols])
-        k = Intrinsics(
-            MAX_WIDTH, height, k.fx * scale, k.fy * scale, (k.cx + 0.5) * scale - 0.5, (k.cy + 0.5) * scale - 0.5
-        )
     return Photograph(color, metres, k, intrinsics is None, size)
+
+
+def segment_photograph(
+    photograph: Photograph, segmenter: SureSegmenter
+) -> tuple[Photograph, tuple[Labels, NDArray[np.float32] | None]]:
+    """Segment a photograph at the scale that suits its canes: the largest at which they are not wide.
+
+    Args:
+        photograph: As `load_photograph` gives it.
+        segmenter: The network.
+
+    Returns:
+        The scaled photograph, and the classes of its pixels (H×W) with their probabilities (H×W or None).
+
+    Raises:
+        InputError: The image is blank.
+    """
+    scaled = photograph.scaled(FIRST_WIDTH)
+    found = segmenter.classify_surely(scaled.color, scaled.depth)
+    width = cane_width(found[0])
+    wanted = _MAX_WIDTH if width is None else min(_MAX_WIDTH, int(FIRST_WIDTH * _WIDE_CANE / width))
+    if wanted <= FIRST_WIDTH or scaled is photograph:
+        return scaled, found
+    scaled = photograph.scaled(wanted)
+    return scaled, segmenter.classify_surely(scaled.color, scaled.depth)
+
+
+def cane_width(labels: Labels) -> float | None:
+    """Median width of the canes (px) along their middle lines; None where too few pixels are of canes."""
+    wood = _cane_mask(labels)
+    if np.count_nonzero(wood) < _MIN_CANE_PIXELS:
+        return None
+    return 2.0 * float(np.median(distance_transform_edt(wood)[skeletonize(wood)])) - 1.0
 
 
 def _color(path: Path) -> NDArray[np.uint8]:
@@ -242,10 +297,9 @@ def _cane_mask(labels: Labels) -> Mask:
 
 def _assumed_depth(photograph: Photograph, labels: Labels) -> float | Reason:
     """Depth at which the visible canes would have a common thickness (m), or the reason why there is none."""
-    wood = _cane_mask(labels)
-    if np.count_nonzero(wood) < _MIN_CANE_PIXELS:
+    width = cane_width(labels)
+    if width is None:
         return reasons.no_cane_recognised()
-    width = 2.0 * float(np.median(distance_transform_edt(wood)[skeletonize(wood)])) - 1.0
     if width < _MIN_CANE_WIDTH:
         return reasons.canes_too_narrow(width, _MIN_CANE_WIDTH)
     return photograph.intrinsics.fx * _COMMON_DIAMETER / width

@@ -20,7 +20,7 @@ from perception.arrays import Labels
 from perception.segmentation.frame import CANE, CORDON, NODE, OLD_CUT, SPUR, TRUNK
 from perception.segmentation.network_segmenter import NetworkSegmenter
 from perception.segmentation.segmenter import SHIPPED
-from perception.single_image import load_photograph
+from perception.single_image import load_photograph, segment_photograph
 from rolling_panda.errors import InputError
 from rolling_panda.resources import resource
 
@@ -152,8 +152,7 @@ def network(weights: Path | None) -> Method:
     segmenter = NetworkSegmenter(weights or resource(SHIPPED))
 
     def tell(path: Path) -> tuple[Labels, NDArray[np.float32] | None]:
-        photograph = load_photograph(path)
-        labels, likely = segmenter.classify_surely(photograph.color, None)
+        photograph, (labels, likely) = segment_photograph(load_photograph(path), segmenter)
         width, height = photograph.size
         rows = ((np.arange(height) + 0.5) * labels.shape[0] / height).astype(int)
         cols = ((np.arange(width) + 0.5) * labels.shape[1] / width).astype(int)

@@ -4,6 +4,8 @@ import json
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from PIL import Image
 
 from bridge.sim.camera.config import CameraConfig
@@ -12,9 +14,11 @@ from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
 from bridge.sim.vineyard.truth import judge
 from perception.config import PerceptionConfig
-from perception.single_image import Photograph, find_cuts, load_photograph
+from perception.segmentation.frame import BACKGROUND, CANE
+from perception.single_image import Photograph, cane_width, find_cuts, load_photograph, segment_photograph
 from rolling_panda import reasons
 from rolling_panda.errors import InputError
+from rolling_panda.messages.robot import Intrinsics
 from tests.support.cameras import looking_left
 
 PLACE = looking_left(0.5, -0.05, 1.05)
@@ -117,11 +121,37 @@ def test_a_wide_photograph_is_made_smaller_with_depth_and_intrinsics(tmp_path):
     counts = np.tile(np.arange(1696) + 500, (900, 1))
     k = {"width": 1696, "height": 900, "fx": 1000.0, "fy": 1000.0, "cx": 847.5, "cy": 449.5}
     (tmp_path / "k.json").write_text(json.dumps(k), encoding="utf-8")
-    got = load_photograph(tmp_path / "a.jpg", depth_png(tmp_path / "d.png", counts), tmp_path / "k.json")
+    whole = load_photograph(tmp_path / "a.jpg", depth_png(tmp_path / "d.png", counts), tmp_path / "k.json")
+    got = whole.scaled(848)
+    assert whole.scaled(1696) is whole
     assert got.color.shape == (450, 848, 3) and got.size == (1696, 900) and not got.assumed
     assert (got.intrinsics.fx, got.intrinsics.cx) == (500.0, 423.5)
     # A pixel looks the same way before and after.
     assert abs(got.depth[0, 100] - (201 + 500) / 1000) < 0.0011
+
+
+class Dark:
+    """Takes dark pixels for canes."""
+
+    def classify_surely(self, color, depth):
+        return np.where(color[..., 0] < 128, CANE, BACKGROUND).astype(np.uint8), None
+
+
+@settings(max_examples=20, deadline=None)
+@given(width=st.integers(3, 60), wide=st.integers(600, 3000))
+def test_canes_are_seen_as_large_as_is_of_use(width, wide):
+    color = np.full((300, wide, 3), 255, np.uint8)
+    for left in range(40, wide - 60, 120):
+        color[:, left : left + width] = 0
+    scaled, (labels, _) = segment_photograph(
+        Photograph(color, None, Intrinsics(wide, 300, 900.0, 900.0, wide / 2, 150.0), True, (wide, 300)), Dark()
+    )
+    shown = scaled.color.shape[1]
+    assert labels.shape == scaled.color.shape[:2]
+    assert min(848, wide) <= shown <= min(1920, wide)
+    # Of a few pixels a width is known to a pixel only.
+    assert shown == min(848, wide) or cane_width(labels) < 12.0 * 1.4
+    assert shown == min(1920, wide) or cane_width(labels) > 12.0 / 1.4
 
 
 def test_intrinsics_that_nobody_gave_are_called_a_guess(image):
