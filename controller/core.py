@@ -98,8 +98,8 @@ class Controller:
         self._points_seen: object = None
         self._state_due = -math.inf
         self._relaxed_limits = (*wider("controller", config), *wider("robot", robot_config))
-        for line in self._relaxed_limits:
-            self._event_log.log(reasons.limit_relaxed(line))
+        for relaxed in self._relaxed_limits:
+            self._event_log.log(reasons.limits_relaxed(relaxed))
 
     @property
     def mode(self) -> m.Mode:

@@ -28,7 +28,7 @@ def controller_state(
     nearest: Clearance | None,
     order: m.QueueOrder,
     interrupted: m.Interrupted,
-    relaxed_limits: tuple[str, ...],
+    relaxed_limits: tuple[m.Reason, ...],
     now: float,
 ) -> m.ControllerState:
     """The message of the controller's state.

@@ -202,9 +202,7 @@ class PerceptionProcess:
         self._timed_out = timed_out
         if not timed_out:
             self._sequence += 1
-        self._out.append(
-            m.Heartbeat(process="perception", sequence=self._sequence, status="hangs in a frame" if timed_out else "")
-        )
+        self._out.append(m.Heartbeat(process="perception", sequence=self._sequence))
 
     def _log(self, reason: m.Reason, now: float) -> None:
         self._out.append(m.LogEvent(header=m.Header(now), process="perception", reason=reason))

@@ -12,7 +12,9 @@ from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 from msgspec import Meta, Struct, structs
 
+from rolling_panda import reasons
 from rolling_panda.errors import ConfigError
+from rolling_panda.messages.types import Reason
 
 _SAFETY = "safety"
 
@@ -148,13 +150,20 @@ def _metas(hint: Any) -> tuple[Meta, ...]:
     return tuple(meta for meta in metas if isinstance(meta, Meta))
 
 
-def wider(section: str, config: Struct) -> tuple[str, ...]:
-    """Texts of the safety values of a section that are less strict than usual."""
-    return tuple(
-        f"[{section}] {each.name} = {_shown(each.value)}, usually {_shown(each.usual)} (allowed: {each.bound})"
-        for each in numbers(config)
-        if each.bound.wider(each.value, each.usual)
-    )
+def wider(section: str, config: Struct) -> tuple[Reason, ...]:
+    """The safety values of a section that are less strict than usual."""
+    found = []
+    for each in numbers(config):
+        key, bound = f"[{section}] {each.name}", each.bound
+        if not bound.wider(each.value, each.usual):
+            continue
+        if bound.switch:
+            found.append(reasons.safeguard_off(key))
+        elif bound.safer == "less":
+            found.append(reasons.limit_raised(key, each.value, each.usual, bound.high))
+        else:
+            found.append(reasons.limit_lowered(key, each.value, each.usual, bound.low))
+    return tuple(found)
 
 
 def check(where: str, section: str, table: Mapping[str, Any], kind: type[Struct]) -> None:

@@ -767,7 +767,7 @@ def wire_plain() -> None:
 
 
 @_reason("warning", "if nobody means that, have the configuration changed back")
-def limits_relaxed(limits: str) -> None:
+def limits_relaxed(limits: Reason) -> None:
     """Set wider than usual: {limits}."""
 
 
@@ -1268,8 +1268,18 @@ def message_rejected(topic: str, detail: str) -> None:
 
 
 @_reason("warning", "")
-def limit_relaxed(detail: str) -> None:
-    """Less strict than usual: {detail}."""
+def limit_raised(key: str, value: float, usual: float, limit: float) -> None:
+    """{key} = {value:g}, usually {usual:g}, at most {limit:g}."""
+
+
+@_reason("warning", "")
+def limit_lowered(key: str, value: float, usual: float, limit: float) -> None:
+    """{key} = {value:g}, usually {usual:g}, at least {limit:g}."""
+
+
+@_reason("warning", "")
+def safeguard_off(key: str) -> None:
+    """{key} is off."""
 
 
 @_reason("error", "")
@@ -2699,7 +2709,7 @@ def device_fault(device: str, detail: str) -> None:
 
 
 @_reason("error", "")
-def both_faults(first: Reason, second: Reason) -> None:
+def both(first: Reason, second: Reason) -> None:
     """{first}; {second}."""
 
 

@@ -202,8 +202,8 @@ def _robot_context(
         PageView(link, model, widened, wire.plain),
         held_elsewhere=lambda session: app_state.held_elsewhere(session, robot),
     )
-    for line in widened:
-        robot.log.note(reasons.limit_relaxed(line))
+    for relaxed in widened:
+        robot.log.note(reasons.limits_relaxed(relaxed))
     if wire.plain:
         robot.log.note(reasons.plain_wire())
     return robot

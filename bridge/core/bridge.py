@@ -92,7 +92,7 @@ class BridgeCore:
         rejections: Rejections | None = None,
         cuts: CutMemory | None = None,
         memory: KeptValue[Remembered] | None = None,
-        relaxed_limits: tuple[str, ...] = (),
+        relaxed_limits: tuple[m.Reason, ...] = (),
         draw: Callable[[], str] = draw_id,
     ) -> None:
         """Start with the watchdog tripped, at rest, without a stop.
@@ -145,7 +145,7 @@ class BridgeCore:
         self._cut_id = ""
         self._outcome: m.Outcome = ""
         self._relaxed_limits = relaxed_limits
-        self._events = [reasons.limit_relaxed(line) for line in relaxed_limits]
+        self._events = [reasons.limits_relaxed(each) for each in relaxed_limits]
         self._state_due = True
 
     @property

@@ -101,7 +101,7 @@ class RealRobot:
             blades.cut_id,
             blades.outcome,
             blades.detail,
-            fault=reduce(reasons.both_faults, faults) if faults else None,
+            fault=reduce(reasons.both, faults) if faults else None,
             severe=base.severe or arm.severe,
             emergency=base.emergency,
             battery=base.battery if 0.0 <= base.battery <= 1.0 else None,

@@ -105,7 +105,7 @@ class PageState(PageMessage, frozen=True, kw_only=True):
     stops: tuple[StopState, ...] = ()
     speed_ratios: tuple[NonNegative, ...] = ()
     replay: ReplayState | None = None
-    relaxed_limits: tuple[Text, ...] = ()
+    relaxed_limits: tuple[Reason, ...] = ()
     plain_wire: bool = False
 
 

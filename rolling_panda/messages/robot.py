@@ -192,7 +192,7 @@ class BridgeState(Message, frozen=True, kw_only=True):
     round_trip_worst_s: NonNegative = 0.0
     rejections: tuple[RejectionCount, ...] = ()
     battery: Fraction | None = None
-    relaxed_limits: tuple[Text, ...] = ()
+    relaxed_limits: tuple[Reason, ...] = ()
     holder: Annotated[str, Meta(max_length=16)] = ""
     sequence: Count = 0
     moving: bool = False

@@ -155,7 +155,7 @@ class ControllerState(Message, frozen=True, kw_only=True):
     proximity: Proximity | None = None
     order: QueueOrder = QueueOrder()
     interrupted: Interrupted = ""
-    relaxed_limits: tuple[Text, ...] = ()
+    relaxed_limits: tuple[Reason, ...] = ()
 
 
 #: Public key of a client: a digest of its session, never the session itself. Empty = nobody.

@@ -97,12 +97,10 @@ class Heartbeat(Message, frozen=True, kw_only=True):
     Attributes:
         process: The sender.
         sequence: Number of loop iterations. It stops growing when the loop hangs, even if sending continues.
-        status: State of the process, as text.
     """
 
     process: Process
     sequence: Count
-    status: Text = ""
 
 
 class LogEvent(Message, frozen=True, kw_only=True):

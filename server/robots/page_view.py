@@ -26,7 +26,7 @@ class PageView:
     """Builds `PageState` and `PagePoints`. The last known state stays, with its age."""
 
     def __init__(
-        self, link: RobotLink, model: RobotModel, relaxed_limits: tuple[str, ...] = (), plain_wire: bool = False
+        self, link: RobotLink, model: RobotModel, relaxed_limits: tuple[m.Reason, ...] = (), plain_wire: bool = False
     ) -> None:
         """Build messages from what comes over `link`.
 

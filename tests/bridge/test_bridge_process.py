@@ -139,9 +139,10 @@ def test_the_widest_deadline_that_can_be_set_still_stops_it_within_its_bound(tmp
     """The largest speed, deadline and fading that any configuration may have, from the last command that was sent."""
     fastest = (*RobotModel().drive.wheels(0.3, 0.0), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     with running_bridge(tmp_path, deadline_s=0.2, fade_s=0.1, wheel_acceleration=12.5) as bridge:
-        assert [line.split(",")[0] for line in bridge.newest().relaxed_limits] == [
-            "[bridge] fade_s = 0.1",
-            "[bridge] deadline_s = 0.2",
+        relaxed = [dict(each.values) for each in bridge.newest().relaxed_limits]
+        assert [(values["key"], values["value"]) for values in relaxed] == [
+            ("[bridge] fade_s", 0.1),
+            ("[bridge] deadline_s", 0.2),
         ]
         bridge.drive(0.3, REST)
         last = bridge.drive(1.0, fastest)

@@ -25,6 +25,7 @@ from tests.bridge.test_bridge_core import FORWARD, Bench, IdealRobot, cut, odome
 from tests.support.bridge_rig import MODEL, PICTURE, REST
 from tests.support.fake_wire import as_received
 
+RELAXED = reasons.limit_raised("[bridge] fade_s", 0.1, 0.05, 0.1)
 SILENT, REFLEX = reasons.base_silent("drives/joint_states"), reasons.arm_reflex("joint_reflex")
 
 
@@ -54,13 +55,11 @@ def refused_cuts(bench: Bench) -> dict[str, int]:
 
 def test_limits_that_are_less_strict_are_reported_at_the_start_and_in_every_state() -> None:
     bench = Bench()
-    bench.core = BridgeCore(
-        bench.robot, BridgeConfig(), MODEL.limits, odometer(), "fakes", relaxed_limits=("fade_s 0.1",)
-    )
+    bench.core = BridgeCore(bench.robot, BridgeConfig(), MODEL.limits, odometer(), "fakes", relaxed_limits=(RELAXED,))
     out = tick(bench)
-    assert lines(out)[0] == ("warning", text_of(reasons.limit_relaxed("fade_s 0.1")))
+    assert lines(out)[0] == ("warning", text_of(reasons.limits_relaxed(RELAXED)))
     assert out.state is not None
-    assert (out.state.relaxed_limits, out.state.kind) == (("fade_s 0.1",), "fakes")
+    assert (out.state.relaxed_limits, out.state.kind) == ((RELAXED,), "fakes")
 
 
 def test_before_any_command_the_robot_is_held_and_told_to_rest(bench: Bench) -> None:

@@ -118,7 +118,7 @@ def test_the_faults_of_two_devices_are_both_told(rig: Rig, plant: RealPlant) -> 
     rig.drive_on()
     plant.base.tell(f"mute {mp500.WHEELS}")
     plant.arm.tell("press")
-    both = reasons.both_faults(SILENT, reasons.arm_user_stopped())
+    both = reasons.both(SILENT, reasons.arm_user_stopped())
     assert rig.until(lambda: reasons.robot_faulty(both) in log(rig), FORWARD)
     plant.base.tell("free")
     plant.arm.tell("free")

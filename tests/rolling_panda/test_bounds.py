@@ -192,15 +192,15 @@ def test_what_is_stricter_is_taken_without_a_word_and_what_is_wider_is_said(tmp_
     assert wider("bridge", load_section(path, "bridge", BridgeConfig)) == ()
     path = write(tmp_path, "bridge", {"deadline_s": 0.195, "joint_margin": 0.006})
     assert wider("bridge", load_section(path, "bridge", BridgeConfig)) == (
-        "[bridge] deadline_s = 0.195, usually 0.19 (allowed: more than 0, at most 0.2)",
-        "[bridge] joint_margin = 0.006, usually 0.01 (allowed: from 0.005 to 0.2)",
+        reasons.limit_raised("[bridge] deadline_s", 0.195, 0.19, 0.2),
+        reasons.limit_lowered("[bridge] joint_margin", 0.006, 0.01, 0.005),
     )
     path = write(tmp_path, "controller", {"work.post_cut_check": False})
     assert wider("controller", load_section(path, "controller", ControllerConfig)) == (
-        "[controller] work.post_cut_check = false, usually true (allowed: true or false)",
+        reasons.safeguard_off("[controller] work.post_cut_check"),
     )
     assert wider("server", ServerConfig(invite_s=3600.0)) == (
-        "[server] invite_s = 3600, usually 600 (allowed: more than 0, at most 3600)",
+        reasons.limit_raised("[server] invite_s", 3600.0, 600.0, 3600.0),
     )
 
 
@@ -208,17 +208,17 @@ def test_the_bridge_and_the_controller_say_what_is_wider_at_the_start_and_in_eve
     path = tmp_path / "wide.toml"
     text = SIM.read_text().replace("deadline_s = 0.19", "deadline_s = 0.195").replace("width = 848", "width = 64")
     path.write_text(text.replace("height = 480", "height = 48"))
-    line = "[bridge] deadline_s = 0.195, usually 0.19 (allowed: more than 0, at most 0.2)"
+    deadline = reasons.limit_raised("[bridge] deadline_s", 0.195, 0.19, 0.2)
     core = simulated_bridge(path, 0)
     try:
         outputs = [core.step(0.001 * n) for n in range(1, 60)]
     finally:
         core.robot.close()
-    assert reasons.limit_relaxed(line) in [event.reason for each in outputs for event in each.events]
-    assert {each.state.relaxed_limits for each in outputs if each.state is not None} == {(line,)}
+    assert reasons.limits_relaxed(deadline) in [event.reason for each in outputs for event in each.events]
+    assert {each.state.relaxed_limits for each in outputs if each.state is not None} == {(deadline,)}
 
     told = Controller(controller_config(whole_body__arm_velocity_scale=0.9), RobotConfig())
     out = told.step(Inbox(), 1.0)
-    words = "[controller] whole_body.arm_velocity_scale = 0.9, usually 0.6 (allowed: more than 0, at most 1)"
-    assert reasons.limit_relaxed(words) in [event.reason for event in every(out, m.LogEvent)]
-    assert [state.relaxed_limits for state in every(out, m.ControllerState)] == [(words,)]
+    scale = reasons.limit_raised("[controller] whole_body.arm_velocity_scale", 0.9, 0.6, 1.0)
+    assert reasons.limits_relaxed(scale) in [event.reason for event in every(out, m.LogEvent)]
+    assert [state.relaxed_limits for state in every(out, m.ControllerState)] == [(scale,)]

@@ -78,15 +78,13 @@ def test_everything_ages_and_nothing_disappears(wire, view):
 
 def test_what_any_process_has_set_wider_than_usual_is_shown_once(wire):
     link = RobotLink(wire)
-    view = PageView(link, MODEL, ("[server] invite_s = 900, usually 600",))
-    both = "[robot] wheel_acceleration = 17.9, usually 15"
-    wire.deliver(topics.BRIDGE, msgspec.structs.replace(bridge_state(), relaxed_limits=("[bridge] fade_s = 0.1", both)))
+    own = reasons.limit_raised("[server] invite_s", 900.0, 600.0, 3600.0)
+    fade = reasons.limit_raised("[bridge] fade_s", 0.1, 0.05, 0.1)
+    both = reasons.limit_raised("[robot] wheel_acceleration", 17.9, 15.0, 18.0)
+    view = PageView(link, MODEL, (own,))
+    wire.deliver(topics.BRIDGE, msgspec.structs.replace(bridge_state(), relaxed_limits=(fade, both)))
     wire.deliver(topics.CONTROLLER, msgspec.structs.replace(controller_state(), relaxed_limits=(both,)))
-    assert view.state(1, 0, now=0.0).relaxed_limits == (
-        "[bridge] fade_s = 0.1",
-        both,
-        "[server] invite_s = 900, usually 600",
-    )
+    assert view.state(1, 0, now=0.0).relaxed_limits == (fade, both, own)
     link.close()
 
 

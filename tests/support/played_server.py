@@ -125,7 +125,7 @@ class PlayedServer:
     stopped: tuple[StopState, ...] = ()
     replay: ReplayState | None = None
     plain_wire: bool = False
-    relaxed_limits: tuple[str, ...] = ()
+    relaxed_limits: tuple[m.Reason, ...] = ()
     online: bool = True
     silent: bool = False
     #: How long ago it heard each process, where none is gone (s).

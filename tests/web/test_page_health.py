@@ -85,6 +85,7 @@ def test_alarms_come_worst_first_with_what_to_do_and_go(page: Page, server: Play
     expect(page.locator("#alarms li .act")).to_have_attribute("data-steps", "press_resume press_survey")
 
 
+RELAXED = (reasons.limit_raised("[bridge] deadline_s", 0.195, 0.19, 0.2), reasons.safeguard_off("[controller] x"))
 #: A state in which each alarm is present; the link's and the server's have tests of their own.
 STATES: dict[str, dict[str, Any]] = {
     "bridge_gone": {"gone": {"bridge": 3.0}},
@@ -103,7 +104,7 @@ STATES: dict[str, dict[str, Any]] = {
     "joint_near_limit": {"controller": controller(joint_margin=0.02)},
     "arm_stretched": {"controller": controller(manipulability=0.01)},
     "wire_plain": {"plain_wire": True},
-    "limits_relaxed": {"relaxed_limits": ("[bridge] deadline_s = 0.195, usually 0.19",)},
+    "limits_relaxed": {"relaxed_limits": RELAXED},
     "cuts_unknown": {"points": (point(1, "UNKNOWN"),)},
 }
 
@@ -121,6 +122,12 @@ def test_each_alarm_comes_with_its_state_and_goes(page: Page, server: PlayedServ
             expect(row).to_have_attribute("data-severity", reasons.CATALOGUE[code].severity)
             if act := reasons.CATALOGUE[code].act:
                 expect(row.locator(".act")).to_contain_text(act[1:])
+
+
+def test_every_limit_that_is_set_wider_than_usual_is_told(page: Page, server: PlayedServer) -> None:
+    server.relaxed_limits = RELAXED
+    for each in RELAXED:
+        expect(page.locator('[data-code="limits_relaxed"] strong')).to_contain_text(reasons.text_of(each))
 
 
 def test_without_a_link_that_is_the_one_alarm_until_it_is_back(page: Page, server: PlayedServer) -> None:

@@ -228,7 +228,7 @@ export interface ControllerState {
   /** Activity that a pause or a protective stop interrupted; empty after the next start, or when disarmed. */
   interrupted: Interrupted;
   /** Safety limits that its configuration sets less strictly than usual, within their hard bounds. */
-  relaxed_limits: string[];
+  relaxed_limits: Reason[];
 }
 
 /** Messages of a topic that were refused for one reason. */
@@ -273,7 +273,7 @@ export interface BridgeState {
   /** Charge of the base, 0 … 1; None if unknown, as in simulation. */
   battery: number|null;
   /** Safety limits that its configuration sets less strictly than usual, within their hard bounds. */
-  relaxed_limits: string[];
+  relaxed_limits: Reason[];
   /** First 16 hexadecimal digits of the SHA-256 of the token's random part; empty without a holder. */
   holder: string;
   /** `sequence` of the motion command that the robot follows, or followed last. */
@@ -408,7 +408,7 @@ export interface PageState {
   /** The recording that is replayed; None with a robot. */
   replay: ReplayState|null;
   /** Safety limits that a process's configuration sets less strictly than usual. */
-  relaxed_limits: string[];
+  relaxed_limits: Reason[];
   /** True if the wire has no TLS: every program on the robot's machine can move it. */
   plain_wire: boolean;
 }

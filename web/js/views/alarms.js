@@ -112,8 +112,13 @@ function ofDevices(state) {
 function ofSettings({ relaxed_limits, plain_wire }) {
   return [
     ...when(plain_wire, reason("wire_plain")),
-    ...when(relaxed_limits.length > 0, reason("limits_relaxed", { limits: relaxed_limits.join("; ") })),
+    ...(relaxed_limits.length > 0 ? [alarm(reason("limits_relaxed", { limits: together(relaxed_limits) }))] : []),
   ];
+}
+
+/** @param {readonly Reason[]} reasons At least one. */
+function together(reasons) {
+  return reasons.reduce((first, second) => reason("both", { first, second }));
 }
 
 function ofWork() {
