@@ -30,6 +30,7 @@ FORWARDED = {
         "certificates of one's own for mutual TLS on the robot's wire",
     ),
     "perceive": ("perception.perceive", "classes and pruning points of one photograph"),
+    "dataset": ("perception.dataset", "labelled pictures of a vineyard: import, export, check"),
     "vineyard": ("bridge.sim.vineyard.command", "grow a simulated row, write and picture it"),
     "bench": ("benchmarks", "measurements: time of a control step, cuts in simulated rows"),
 }

@@ -1,0 +1,1 @@
+"""Labelled pictures of vines: one format on disk, and what other programs write."""
