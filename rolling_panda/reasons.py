@@ -1334,12 +1334,12 @@ def cut_unknown() -> None:
 
 @_reason("warning", "send less")
 def socket_bytes_exceeded(limit_hz: float) -> None:
-    """It sent more than {limit_hz:.0f} bytes a second."""
+    """The page sent more than {limit_hz:.0f} bytes a second."""
 
 
 @_reason("warning", "send less")
 def socket_messages_exceeded(limit_hz: float) -> None:
-    """It sent more than {limit_hz:.0f} messages a second."""
+    """The page sent more than {limit_hz:.0f} messages a second."""
 
 
 @_reason("warning", "send less")
@@ -1354,7 +1354,7 @@ def too_many_sockets() -> None:
 
 @_reason("warning", "")
 def socket_unread() -> None:
-    """It did not read what it was sent."""
+    """The page did not read what it was sent."""
 
 
 @_reason("warning", "close other pages, then try again")
@@ -2412,7 +2412,7 @@ def point_to_accept(point: str, state: str) -> None:
     """{point} is {state}."""
 
 
-@_reason("warning", "move the latter to the front")
+@_reason("warning", "move the point that you want first to the front")
 def another_comes_first(other: str, point: str) -> None:
     """In the order of work {other} comes before {point}."""
 
@@ -2439,7 +2439,7 @@ def joint_elsewhere(angle_rad: float) -> None:
 
 @_reason("warning", "")
 def accepted_later(point: str) -> None:
-    """{point} was accepted after it was made."""
+    """{point} was accepted after the preview was made."""
 
 
 @_reason("warning", "")
@@ -2499,7 +2499,7 @@ def torque_lacking(joint: str, needed: float, limit: float) -> None:
 
 @_reason("warning", "")
 def takes_too_long(limit_s: float) -> None:
-    """It takes longer than {limit_s:.0f} s a point."""
+    """The search takes longer than {limit_s:.0f} s a point."""
 
 
 @_reason("error", "")
@@ -2537,12 +2537,12 @@ def command_old() -> None:
 
 @_reason("warning", "")
 def echo_unsent() -> None:
-    """It echoes a joint state that was never sent."""
+    """The command echoes a joint state that was never sent."""
 
 
 @_reason("warning", "")
 def command_late() -> None:
-    """It was computed from a joint state that is too old."""
+    """The command was computed from a joint state that is too old."""
 
 
 @_reason("warning", "")
@@ -2562,7 +2562,7 @@ def must_begin_at_rest() -> None:
 
 @_reason("warning", "")
 def epoch_old() -> None:
-    """It is an older controller's command."""
+    """The command is of an older controller."""
 
 
 @_reason("warning", "")
@@ -2617,7 +2617,7 @@ def cutter_inhibited() -> None:
 
 @_reason("warning", "")
 def not_in_command() -> None:
-    """It is not from the controller that commands the robot."""
+    """The command is not from the controller that commands the robot."""
 
 
 @_reason("warning", "")

@@ -1,4 +1,4 @@
-"""The topic table. Publishers, subscribers, staleness limits and `docs/wire.md` derive from it.
+"""The topic table. Publishers, subscribers, access control and `docs/wire.md` derive from it.
 
 A key is `rp/<robot_id>/v3/<topic>`.
 """

@@ -12,8 +12,7 @@ from rolling_panda import messages as m
 from rolling_panda import reasons
 
 #: Kind of a row: state of a point, order of work, approach, requirement of previews, command of an operator with its
-#: answer, stop, log line,
-#: start.
+#: answer, stop, log line, start.
 Kind = Literal["ticket", "order", "approach", "preview", "request", "stop", "event", "start"]
 
 

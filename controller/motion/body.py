@@ -21,7 +21,7 @@ from rolling_panda.transport.inbox import Inbox
 
 
 class Body:
-    """State and model of one robot. Call `take` with the inputs of each control period first."""
+    """State and model of one robot. Call `update` with the inputs of each control period first."""
 
     def __init__(self, config: ControllerConfig, robot_config: RobotConfig, method: Method | None = None) -> None:
         """Build them.

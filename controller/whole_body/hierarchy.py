@@ -77,7 +77,7 @@ class Hierarchy:
         self._stack(self.secondary_tasks(robot, config))
 
     def secondary_tasks(self, robot: RobotModel, config: WholeBodyConfig) -> Sequence[SecondaryTask]:
-        """The tasks of the null space; their weights are in `[controller.hierarchy]`."""
+        """The tasks of the null space; their weights are in `[controller.whole_body.hierarchy]`."""
         weights, speed = config.hierarchy, self._box.speed
         return (
             BaseReference(weights.base_place, weights.base_heading, config.gain_posture, config.gain_heading, speed),

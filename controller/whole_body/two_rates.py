@@ -17,7 +17,7 @@ from rolling_panda.model.differential_drive import NXI, Array
 
 
 class TwoRates:
-    """A method for one `IkProblem` in every control period. Call `begin` in each period before `solve`."""
+    """A method for one `IkProblem` in every control period. Call `start_period` in each period before `solve`."""
 
     def __init__(self, arm: Method, base: Method, every: int) -> None:
         """Bind the method for each period, and the same for a period of the base.

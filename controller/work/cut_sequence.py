@@ -1,8 +1,8 @@
 """The cut sequence: posture search, travel, approach, advance, cut, retreat, next cut.
 
-Between cuts the tool keeps `clearance` from the canes. It moves into them and out of them on one straight line, with
-the base at rest. The posture search for the next cut runs while the blades close, so that the retreat from one cut
-blends into the motion to the next.
+Between cuts the tool keeps `clearance` from the canes. It moves into them and out of them on one straight line; near
+the cut (`arm_only`) the base is at rest. The posture search for the next cut runs while the blades close, so that the
+retreat from one cut blends into the motion to the next.
 """
 
 from controller.config import ControllerConfig

@@ -42,7 +42,7 @@ def bounds_table() -> str:
             usual = ", ".join(_format(each.usual, each.bound) for each in limits)
             bounds = list(dict.fromkeys(str(each.bound) for each in limits))
             allowed = bounds[0] if len(bounds) == 1 else ", ".join(str(each.bound) for each in limits)
-            stricter = _STRICTER[limits[0].bound.safer]
+            stricter = "on" if isinstance(limits[0].usual, bool) else _STRICTER[limits[0].bound.safer]
             rows.append((f"`[{name}]`", f"`{key}`", usual, allowed, stricter, descriptions[key]))
     return table(("section", "key", "usual", "hard bound", "stricter", "what"), rows)
 
