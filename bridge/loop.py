@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from bridge.core.bridge import TICK_S, BridgeCore
 from bridge.core.robot_time import RealTime, RobotTime, SteppedTime
 from rolling_panda import messages as m
-from rolling_panda import reasons
 from rolling_panda.messages.perception import CloseUpRequest
 from rolling_panda.messages.supervision import HardwareStop
 from rolling_panda.transport.inbox import Inbox, Received, Rejected, Reply
@@ -36,7 +35,7 @@ class BridgeProcess:
         core, out = self._core, list[object]()
         due = self._time.due(now)
         for rejected in inbox.drain(Rejected):
-            core.refusals.log(rejected.message.topic, reasons.message_undecodable(rejected.message.reason[:200]))
+            core.refusals.log(rejected.message.topic, rejected.message.reason)
         for button in inbox.drain(HardwareStop):
             self._press(button.message.pressed)
         for token in inbox.drain(m.TokenRequest):

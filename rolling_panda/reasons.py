@@ -1263,8 +1263,8 @@ def page_message_invalid(user: str, detail: str) -> None:
 
 
 @_reason("warning", "")
-def message_rejected(topic: str, detail: str) -> None:
-    """Refused a message on {topic}: {detail}."""
+def message_rejected(topic: str, cause: Reason) -> None:
+    """Refused a message on {topic}: {cause}."""
 
 
 @_reason("warning", "")
@@ -2526,8 +2526,18 @@ def plan_awaited() -> None:
 
 
 @_reason("warning", "")
-def message_undecodable(detail: str) -> None:
-    """Not a message of this topic: {detail}."""
+def message_undecodable(size: float, detail: str) -> None:
+    """{size:.0f} bytes are not a message of this topic: {detail}."""
+
+
+@_reason("warning", "")
+def message_without_type(size: float) -> None:
+    """{size:.0f} bytes are not a message of this topic: their type is empty."""
+
+
+@_reason("warning", "")
+def message_too_large(size: float, limit: float) -> None:
+    """{size:.0f} bytes are too many for a message, which has at most {limit:.0f}."""
 
 
 @_reason("warning", "")

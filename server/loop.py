@@ -9,6 +9,7 @@ import time
 from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
+from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.topics import HEARTBEAT, PRESENCE
 from server.robots.app_state import AppState
@@ -30,7 +31,7 @@ class Loop:
         self._robot = robot
         self._heartbeats = 0
         self._states = 0
-        self._warned: set[tuple[str, str]] = set()
+        self._warned: set[tuple[str, m.Reason]] = set()
 
     def jobs(self) -> list[Coroutine[Any, Any, None]]:
         """Endless coroutines; cancel them to end."""

@@ -4,10 +4,24 @@ from typing import Any, Generic, TypeVar
 
 import msgspec
 
+from rolling_panda import reasons
 from rolling_panda.errors import MessageError
+from rolling_panda.messages.types import Reason
+from rolling_panda.reasons import text_of
 
 T = TypeVar("T")
 _ENCODER = msgspec.msgpack.Encoder()
+#: Characters of the decoder's words: the bridge's state repeats them.
+_WORDS = 200
+
+
+class UndecodableError(MessageError):
+    """Bytes are not a message of their topic; `reason` says why."""
+
+    def __init__(self, reason: Reason) -> None:
+        """Store the reason."""
+        super().__init__(text_of(reason))
+        self.reason = reason
 
 
 class _Nothing(msgspec.Struct, frozen=True, tag="", forbid_unknown_fields=True):
@@ -33,15 +47,13 @@ class StrictDecoder(Generic[T]):
         """The message in `data`.
 
         Raises:
-            MessageError: Not msgpack, another type or none, an unknown or missing field, a wrong length, NaN, infinity,
-                or a number out of range; the text names the field.
+            UndecodableError: Not msgpack, another type or none, an unknown or missing field, a wrong length, NaN,
+                infinity, or a number out of range; the reason names the field.
         """
         try:
             message = self._decoder.decode(data)
-        except msgspec.MsgspecError as error:
-            raise MessageError(f"{len(data)} bytes refused: {error}") from error
-        except (UnicodeDecodeError, RecursionError) as error:
-            raise MessageError(f"{len(data)} bytes refused: not a message ({error})") from error
+        except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
+            raise UndecodableError(reasons.message_undecodable(len(data), str(error)[:_WORDS])) from error
         if isinstance(message, _Nothing):
-            raise MessageError(f"{len(data)} bytes refused: the type is empty")
+            raise UndecodableError(reasons.message_without_type(len(data)))
         return message

@@ -59,7 +59,7 @@ class Rejected:
     """Input of a `step`: a message that could not be decoded."""
 
     topic: str
-    reason: str
+    reason: m.Reason
 
 
 class Inbox:

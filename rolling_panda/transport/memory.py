@@ -67,7 +67,7 @@ class MemoryWire:
     def __init__(self, world: "World", process: m.Process) -> None:
         """Connect."""
         self.process = process
-        self.on_reject: Callable[[str, str], None] = lambda topic, reason: None
+        self.on_reject: Callable[[str, m.Reason], None] = lambda topic, reason: None
         self._world = world
         self._stores: dict[str, Callable[[Any, float], None]] = {}
 

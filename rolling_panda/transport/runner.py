@@ -57,7 +57,7 @@ class Wire(Protocol):
     """A process's session: `transport.zenoh.Transport`, or `transport.memory.MemoryWire`."""
 
     process: m.Process
-    on_reject: Callable[[str, str], None]
+    on_reject: Callable[[str, m.Reason], None]
 
     def publisher(self, topic: Topic[Any]) -> Sender:
         """What sends messages of a topic."""
@@ -225,7 +225,7 @@ class Runner:
 
         return handle
 
-    def _reject(self, topic: str, reason: str) -> None:
+    def _reject(self, topic: str, reason: m.Reason) -> None:
         self._queued[Rejected].append((Rejected(topic, reason), self._time()))
 
     def wake(self) -> None:

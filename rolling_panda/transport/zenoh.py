@@ -18,11 +18,11 @@ from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.closing import Closing
 from rolling_panda.config import TransportConfig
-from rolling_panda.errors import MessageError, ServiceError, TransportError
+from rolling_panda.errors import ServiceError, TransportError
 from rolling_panda.reasons import said
 from rolling_panda.topics import Service, Topic, key
 from rolling_panda.transport.access import ONLOOKER
-from rolling_panda.transport.codec import StrictDecoder, encode
+from rolling_panda.transport.codec import StrictDecoder, UndecodableError, encode
 from rolling_panda.transport.inbox import Received
 from rolling_panda.transport.rejections import Rejections
 from rolling_panda.transport.settings import certificate_folder, wire_settings
@@ -109,7 +109,7 @@ class Onlooker(Closing):
         #: Whether the wire is unencrypted and open to every program on this machine.
         self.plain = config.plain_wire
         self.rejections = Rejections()
-        self.on_reject: Callable[[str, str], None] = lambda topic, reason: None
+        self.on_reject: Callable[[str, m.Reason], None] = lambda topic, reason: None
         self._present: set[str] = set()
         self._session = _open(config, name, robot_id)
         self._presence = self._session.liveliness().declare_subscriber(
@@ -139,8 +139,8 @@ class Onlooker(Closing):
             at = time.monotonic()
             try:
                 message = decoder.decode(_bounded(sample.payload.to_bytes()))
-            except MessageError as error:
-                self._reject(topic.name, str(error))
+            except UndecodableError as error:
+                self._reject(topic.name, error.reason)
                 return
             store(message, at)
 
@@ -155,8 +155,8 @@ class Onlooker(Closing):
         if not self._session.is_closed():
             self._session.close()
 
-    def _reject(self, topic: str, reason: str) -> None:
-        self.rejections.add(topic, reasons.message_undecodable(reason[:200]))
+    def _reject(self, topic: str, reason: m.Reason) -> None:
+        self.rejections.add(topic, reason)
         self.on_reject(topic, reason)
 
     def _on_presence(self, sample: zenoh.Sample) -> None:
@@ -200,9 +200,9 @@ class Transport(Onlooker):
                 try:
                     payload = query.payload
                     request = decoder.decode(_bounded(payload.to_bytes() if payload is not None else b""))
-                except MessageError as error:
-                    self._reject(service.name, str(error))
-                    result: m.Answer | None = m.Answer(ok=False, reason=said(str(error)))
+                except UndecodableError as error:
+                    self._reject(service.name, error.reason)
+                    result: m.Answer | None = m.Answer(ok=False, reason=error.reason)
                 else:
                     result = answer(request)
                 if result is not None:
@@ -231,7 +231,7 @@ class Transport(Onlooker):
                 break
             try:
                 return StrictDecoder(m.Answer).decode(item.ok.payload.to_bytes())
-            except MessageError as error:
+            except UndecodableError as error:
                 raise ServiceError(f"{service.name} sent something else than an answer: {error}") from error
         raise ServiceError(
             f"{service.name} did not answer within {service.timeout_s} s: is the {service.server} running?"
@@ -359,7 +359,7 @@ def _plain(error: zenoh.ZError) -> str:
 
 def _bounded(data: bytes) -> bytes:
     if len(data) > _MAX_MESSAGE_BYTES:
-        raise MessageError(f"{len(data)} bytes refused: a message has at most {_MAX_MESSAGE_BYTES}")
+        raise UndecodableError(reasons.message_too_large(len(data), _MAX_MESSAGE_BYTES))
     return data
 
 

@@ -78,7 +78,7 @@ class RobotLink:
         # Own threads, so that a controller that does not answer delays nothing else.
         self._callers = ThreadPoolExecutor(max_workers=4, thread_name_prefix="intent")
         self._writer = ThreadPoolExecutor(max_workers=1, thread_name_prefix="event")
-        self.refused: deque[tuple[str, str]] = deque(maxlen=100)
+        self.refused: deque[tuple[str, m.Reason]] = deque(maxlen=100)
         transport.on_reject = lambda topic, reason: self.refused.append((topic, reason))
 
     async def call(self, service: topics.Service[Any], request: object) -> m.Answer:

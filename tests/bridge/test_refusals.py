@@ -33,5 +33,5 @@ def test_what_the_transport_counted_is_in_the_same_table_once() -> None:
 def test_a_flood_of_different_reasons_stays_a_few_lines() -> None:
     refusals = Refusals()
     for number in range(1000):
-        refusals.log("command/motion", reasons.message_undecodable(f"{number} bytes"))
+        refusals.log("command/motion", reasons.message_undecodable(number, "it ends"))
     assert len(refusals.lines(0.0)) <= 51

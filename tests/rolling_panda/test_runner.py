@@ -7,7 +7,7 @@ from contextlib import contextmanager
 import pytest
 
 from rolling_panda import messages as m
-from rolling_panda import topics
+from rolling_panda import reasons, topics
 from rolling_panda.messages.supervision import SessionPlan, StopState
 from rolling_panda.reasons import said
 from rolling_panda.transport.inbox import Answered, Inbox, Rejected, Reply
@@ -214,10 +214,10 @@ def test_a_motion_command_and_the_process_itself_end_the_wait(woken):
 def test_of_what_could_not_be_decoded_the_newest_is_in_the_inbox(parts):
     core, wire, clock, runner = parts
     for number in range(100):
-        wire.on_reject("state/joints", f"{number}")
+        wire.on_reject("state/joints", reasons.message_without_type(number))
     runner.turn(clock.now)
     rejected = core.inbox.drain(Rejected)
-    assert [each.message.reason for each in rejected] == [str(number) for number in range(80, 100)]
+    assert [each.message.reason for each in rejected] == [reasons.message_without_type(n) for n in range(80, 100)]
 
 
 def test_the_loop_keeps_its_rate_counts_late_periods_and_sends_its_last_messages():
