@@ -7,11 +7,13 @@ from pathlib import Path
 
 from perception.config import PerceptionConfig
 from perception.loop import perception_runner
+from perception.models.cards import chosen
 from perception.pipeline import Perception
 from perception.segmentation.segmenter import choose_segmenter
 from rolling_panda.config import RobotConfig, load_section
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.runtime.process import ProcessContext, run_process
+from rolling_panda.runtime.state_folder import usual_state_folder
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -20,15 +22,23 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _check(arguments: argparse.Namespace) -> None:
-    load_section(arguments.config, "perception", PerceptionConfig)
+    network_file(load_section(arguments.config, "perception", PerceptionConfig), arguments)
     load_section(arguments.config, "robot", RobotConfig)
+
+
+def network_file(config: PerceptionConfig, arguments: argparse.Namespace) -> Path | None:
+    """The network of the configuration, else the one of `rolling-panda models use`, else None for the shipped one."""
+    if config.weights:
+        return Path(config.weights)
+    model = chosen(arguments.state or usual_state_folder(arguments.robot_id))
+    return None if model is None else model.path
 
 
 def run(context: ProcessContext) -> None:
     """Run until `context.stopping` is set."""
     config = load_section(context.config_path, "perception", PerceptionConfig)
     model = RobotModel(load_section(context.config_path, "robot", RobotConfig))
-    segmenter = choose_segmenter(config.segmenter, Path(config.weights) if config.weights else None, config.threads)
+    segmenter = choose_segmenter(config.segmenter, network_file(config, context.arguments), config.threads)
     perception_runner(context.transport, config, Perception(config, segmenter, model)).run(context.stopping)
 
 

@@ -233,7 +233,7 @@ class PerceptionConfig(Struct, frozen=True, forbid_unknown_fields=True):
         min_upright: Smallest cosine of the angle between the image's upward direction and the vertical. Frames of a
             camera turned farther are ignored, since the network was not trained on them.
         segmenter: `network`, or `labels` for the label image of the simulated camera.
-        weights: ONNX file of the network; empty for the shipped one.
+        weights: ONNX file of the network; empty for the one of `rolling-panda models use`, else the shipped one.
         threads: Threads of the network.
         fuse: Whether the rule is applied to the map of a spur over all frames, or to each frame alone.
         rule: Pruning rule.

@@ -15,19 +15,15 @@ from skimage.color import rgb2lab
 from skimage.filters import sato
 
 from benchmarks.common.documents import bench_parser, write
-from benchmarks.perception.masks import Agreement, Mask
-from perception.arrays import Labels
-from perception.segmentation.frame import CANE, CORDON, NODE, OLD_CUT, SPUR, TRUNK
+from perception.arrays import Labels, Mask
+from perception.models.judge import SAME, TOGETHER, Agreement, compared, tell
+from perception.segmentation.frame import CANE
 from perception.segmentation.network_segmenter import NetworkSegmenter
 from perception.segmentation.segmenter import SHIPPED
-from perception.single_image import load_photograph, segment_photograph
+from perception.single_image import load_photograph
 from rolling_panda.errors import InputError
 from rolling_panda.resources import resource
 
-#: Classes of people's masks that are compared, and the program's classes that are the same wood.
-SAME = {"trunk": (TRUNK,), "cane": (CANE, NODE, SPUR), "cordon": (CORDON, OLD_CUT)}
-#: Also compared as one class, since people draw the border between them anywhere.
-TOGETHER = {"trunk and cordon": ("trunk", "cordon"), "wood": ("trunk", "cane", "cordon")}
 #: The best share of a ridge filter's pixels, and the widths it looks for (px of the photograph).
 _DECILE, _WIDTHS = 90.0, (2.0, 3.0, 4.0)
 _SUFFIXES = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp", ".bmp")
@@ -134,15 +130,6 @@ def load_mask(path: Path, classes: Sequence[str]) -> dict[str, Mask]:
     return {name: np.isin(values, [k for k, each in enumerate(classes) if each == name]) for name in SAME}
 
 
-def compared(truth: dict[str, Mask], told: Labels) -> list[tuple[str, Mask, Mask]]:
-    """Of each class, and of those taken together: name, true pixels and told pixels."""
-    said = {name: np.isin(told, same) for name, same in SAME.items()}
-    out = [(name, truth[name], said[name]) for name in SAME]
-    for name, parts in TOGETHER.items():
-        out.append((name, np.any([truth[p] for p in parts], axis=0), np.any([said[p] for p in parts], axis=0)))
-    return out
-
-
 def network(weights: Path | None) -> Method:
     """The network as `perceive` uses it.
 
@@ -151,15 +138,7 @@ def network(weights: Path | None) -> Method:
     """
     segmenter = NetworkSegmenter(weights or resource(SHIPPED))
 
-    def tell(path: Path) -> tuple[Labels, NDArray[np.float32] | None]:
-        photograph, (labels, likely) = segment_photograph(load_photograph(path), segmenter)
-        width, height = photograph.size
-        rows = ((np.arange(height) + 0.5) * labels.shape[0] / height).astype(int)
-        cols = ((np.arange(width) + 0.5) * labels.shape[1] / width).astype(int)
-        window = np.ix_(rows, cols)
-        return labels[window], None if likely is None else likely[window]
-
-    return tell
+    return lambda path: tell(load_photograph(path), segmenter)
 
 
 def ridge(path: Path) -> tuple[Labels, None]:

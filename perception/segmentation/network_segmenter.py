@@ -1,5 +1,6 @@
 """Semantic segmentation by the trained network."""
 
+import hashlib
 import json
 from pathlib import Path
 
@@ -76,14 +77,16 @@ class NetworkSegmenter:
         # Spinning threads would take processor time from the controller.
         options.add_session_config_entry("session.intra_op.allow_spinning", "0")
         try:
-            self._session = onnxruntime.InferenceSession(path.read_bytes(), options, providers=["CPUExecutionProvider"])
+            content = path.read_bytes()
+            self._session = onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
         except (OSError, *_LOAD_ERRORS) as error:
             raise ConfigError(f"cannot load the network {path}: {error}") from error
         _check(self._session, path)
         # Between two pictures the network's work space is given back: 75 MiB, for 10 ms at each picture.
         self._run_options = onnxruntime.RunOptions()
         self._run_options.add_run_config_entry("memory.enable_memory_arena_shrinkage", "cpu:0")
-        self.name = f"network {path.name}"
+        # Goes with every message of points: which network proposed them.
+        self.name = f"network {path.name} {hashlib.sha256(content).hexdigest()[:12]}"
         self.width_bias = _width_bias(self._session, path)
         self._multiple = _multiple(self._session, path)
         self._outputs = [

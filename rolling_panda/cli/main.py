@@ -31,6 +31,7 @@ FORWARDED = {
     ),
     "perceive": ("perception.perceive", "classes and pruning points of one photograph"),
     "dataset": ("perception.dataset", "labelled pictures of a vineyard: import, export, check"),
+    "models": ("perception.models", "networks of perception: list, compare, use"),
     "vineyard": ("bridge.sim.vineyard.command", "grow a simulated row, write and picture it"),
     "bench": ("benchmarks", "measurements: time of a control step, cuts in simulated rows"),
 }

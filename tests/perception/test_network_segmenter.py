@@ -1,5 +1,6 @@
 """The network as a segmenter: what it accepts, and what it declines."""
 
+import hashlib
 import io
 
 import numpy as np
@@ -60,12 +61,13 @@ def test_any_size_comes_back_pixel_by_pixel(tmp_path, size):
 
 
 def test_a_frame_is_decoded_and_its_depth_used(tmp_path):
-    segmenter = NetworkSegmenter(written(tmp_path, onnx_by_hand.brightest_channel(CLASSES)))
+    content = onnx_by_hand.brightest_channel(CLASSES)
+    segmenter = NetworkSegmenter(written(tmp_path, content))
     color = np.random.default_rng(0).integers(90, 110, (64, 64, 3), dtype=np.uint8)
     near = np.zeros((64, 64), np.float32)
     near[:32] = 0.3
     said = segmenter.segment(view(color, near))
-    assert np.all(said[:32] == 3) and segmenter.name == "network net.onnx"
+    assert np.all(said[:32] == 3) and segmenter.name == f"network net.onnx {hashlib.sha256(content).hexdigest()[:12]}"
 
 
 @pytest.mark.parametrize("color", [np.zeros((64, 64, 3), np.uint8), np.full((64, 64, 3), 255, np.uint8)])

@@ -1,4 +1,4 @@
-"""How well a class image agrees with a mask that a person drew: recall, precision, overlap, boundaries, calibration."""
+"""How well classes agree with masks that people drew: recall, precision, overlap, boundaries, calibration."""
 
 from dataclasses import dataclass, field
 
@@ -6,7 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion, distance_transform_edt
 
-Mask = NDArray[np.bool_]
+from perception.arrays import Labels, Mask
+from perception.segmentation.frame import CANE, CORDON, NODE, OLD_CUT, SPUR, TRUNK
+from perception.single_image import Photograph, SureSegmenter, segment_photograph
+
+#: Classes of people's masks that are compared, and the program's classes that are the same wood.
+SAME = {"trunk": (TRUNK,), "cane": (CANE, NODE, SPUR), "cordon": (CORDON, OLD_CUT)}
+#: Also compared as one class, since people draw the border between them anywhere.
+TOGETHER = {"trunk and cordon": ("trunk", "cordon"), "wood": ("trunk", "cane", "cordon")}
 
 #: Bins of probability for the calibration error.
 _BINS = 10
@@ -81,6 +88,29 @@ class Agreement:
             "boundary_f": _harmonic(*edges),
             "ece": float(np.abs(self.bins[:, 1] - self.bins[:, 2]).sum() / total) if total else None,
         }
+
+
+def compared(truth: dict[str, Mask], told: Labels) -> list[tuple[str, Mask, Mask]]:
+    """Of each class, and of those taken together: name, true pixels and told pixels."""
+    said = {name: np.isin(told, same) for name, same in SAME.items()}
+    out = [(name, truth[name], said[name]) for name in SAME]
+    for name, parts in TOGETHER.items():
+        out.append((name, np.any([truth[p] for p in parts], axis=0), np.any([said[p] for p in parts], axis=0)))
+    return out
+
+
+def tell(photograph: Photograph, segmenter: SureSegmenter) -> tuple[Labels, NDArray[np.float32] | None]:
+    """Classes of a photograph at its own size (H×W), and the probability of each pixel's class, or None.
+
+    Raises:
+        UnusablePictureError: The photograph is blank.
+    """
+    photograph, (labels, likely) = segment_photograph(photograph, segmenter)
+    width, height = photograph.size
+    rows = ((np.arange(height) + 0.5) * labels.shape[0] / height).astype(int)
+    cols = ((np.arange(width) + 0.5) * labels.shape[1] / width).astype(int)
+    window = np.ix_(rows, cols)
+    return labels[window], None if likely is None else likely[window]
 
 
 def edge(mask: Mask) -> Mask:

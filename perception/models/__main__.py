@@ -1,0 +1,164 @@
+"""`rolling-panda models`: networks, and which one perception uses from its next start.
+
+list     the shipped network and those that were taken into use, with their cards
+compare  two networks on the held-out pictures of a dataset
+use      take a network into use, unless it is worse on held-out pictures than the one in use; `shipped` goes back
+"""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from perception.dataset.dataset import PICTURES, UNLABELLED, Dataset, check, read_dataset
+from perception.models.cards import Figures, Model, choose, choose_shipped, chosen, kept, read_model, shipped
+from perception.models.judge import SAME, TOGETHER, Agreement, compared, tell
+from perception.segmentation.frame import BACKGROUND
+from perception.segmentation.network_segmenter import NetworkSegmenter
+from perception.single_image import SureSegmenter, load_photograph
+from rolling_panda.errors import InputError, RollingPandaError
+from rolling_panda.runtime.process import ROBOT_ID
+from rolling_panda.runtime.state_folder import usual_state_folder
+
+#: A pixel matches one that is at most so far away (px of the photograph).
+TOLERANCE = 3.0
+#: The classes whose F may not fall, and by how much it may: a difference of rounding.
+DECISIVE, _ROUNDING = ("cane", "trunk and cordon"), 0.005
+_SHIPPED = "shipped"
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command; returns the exit code."""
+    arguments = _parser().parse_args(argv)
+    try:
+        arguments.run(arguments)
+    except (RollingPandaError, OSError) as error:
+        print(f"rolling-panda models {arguments.command}: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="rolling-panda models", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    everything = commands.add_parser("list", help="networks and their cards")
+    everything.set_defaults(run=_list)
+    two = commands.add_parser("compare", help="two networks on held-out pictures")
+    two.set_defaults(run=_compare)
+    two.add_argument("first", metavar="MODEL", help=f"ONNX file, or '{_SHIPPED}'")
+    two.add_argument("second", metavar="MODEL", help=f"ONNX file, or '{_SHIPPED}'")
+    two.add_argument("--data", type=Path, required=True, metavar="DIR", help="dataset with held-out pictures")
+    use = commands.add_parser("use", help="take a network into use, unless it is worse than the one in use")
+    use.set_defaults(run=_use)
+    use.add_argument("model", metavar="MODEL", help=f"ONNX file, or '{_SHIPPED}'")
+    use.add_argument("--data", type=Path, metavar="DIR", help="dataset with held-out pictures")
+    for command in (everything, use):
+        command.add_argument("--robot-id", default=ROBOT_ID, help="robot on the wire (default: %(default)s)")
+        state = usual_state_folder("ROBOT_ID")
+        command.add_argument("--state", type=Path, metavar="DIR", help=f"folder of its state (default: {state})")
+    return parser
+
+
+def judge(segmenter: SureSegmenter, dataset: Dataset) -> Figures:
+    """How well a network tells the classes of a dataset's held-out pictures; `bench photographs` measures the same.
+
+    Raises:
+        InputError: The dataset has no held-out picture, or one that cannot be used.
+    """
+    names = dataset.names("held-out")
+    if not names:
+        raise InputError(f"{dataset.folder} holds no picture out; import it with --held-out 0.2")
+    totals = {name: Agreement() for name in (*SAME, *TOGETHER)}
+    for name in names:
+        _, labels = dataset.load(name)
+        told, likely = tell(load_photograph(dataset.folder / PICTURES / name), segmenter)
+        told = np.where(labels == UNLABELLED, BACKGROUND, told).astype(np.uint8)
+        truth = {kind: np.isin(labels, same) for kind, same in SAME.items()}
+        for kind, true, said in compared(truth, told):
+            totals[kind].add(true, said, TOLERANCE, likely)
+    return {kind: total.figures() for kind, total in totals.items()}
+
+
+def worse(old: Figures, new: Figures) -> list[str]:
+    """Of the decisive classes that the pictures show, those at which the new network is worse, with both F."""
+    out = []
+    for name in DECISIVE:
+        before, after = old[name]["f"], new[name]["f"]
+        if old[name]["recall"] is not None and (after or 0.0) < (before or 0.0) - _ROUNDING:
+            out.append(f"{name} {after or 0.0:.3f} instead of {before or 0.0:.3f}")
+    return out
+
+
+def _list(arguments: argparse.Namespace) -> None:
+    state = _state(arguments)
+    used = chosen(state) or shipped()
+    for model in (shipped(), *kept(state)):
+        print(f"{'*' if model.sha256 == used.sha256 else ' '} {model.title}")
+        if model.card is None:
+            print("    no card")
+            continue
+        for data in model.card.data:
+            print(f"    trained on {data.pictures} pictures: {data.source} ({data.licence})")
+        for name, figures in model.card.figures.items():
+            print(f"    {name}: {_line(figures)}")
+    print("* used by perception, unless [perception] weights names another file")
+
+
+def _compare(arguments: argparse.Namespace) -> None:
+    dataset = _dataset(arguments.data)
+    for word in (arguments.first, arguments.second):
+        model = _model(word)
+        print(f"{model.title:32} {_line(judge(NetworkSegmenter(model.path), dataset))}")
+    print(f"on {len(dataset.names('held-out'))} held-out pictures of {dataset.folder}, tolerance {TOLERANCE:g} px")
+
+
+def _use(arguments: argparse.Namespace) -> None:
+    state = _state(arguments)
+    if arguments.model == _SHIPPED:
+        choose_shipped(state)
+        print(f"perception uses the shipped network {shipped().title} from its next start")
+        return
+    if arguments.data is None:
+        raise InputError("give --data with a dataset of held-out pictures, to compare with the network in use")
+    model, used, dataset = _model(arguments.model), chosen(state) or shipped(), _dataset(arguments.data)
+    old = judge(NetworkSegmenter(used.path), dataset)
+    new = judge(NetworkSegmenter(model.path), dataset)
+    print(f"in use  {used.title:32} {_line(old)}\nnew     {model.title:32} {_line(new)}")
+    if losses := worse(old, new):
+        raise InputError(
+            f"{model.path} is worse than the network in use on the held-out pictures: F of {', '.join(losses)}. "
+            "The network in use stays; train longer or on more pictures"
+        )
+    choose(state, model, {f"{dataset.folder.name}, {len(dataset.names('held-out'))} held out": new})
+    print(f"perception uses {model.title} from its next start")
+
+
+def _state(arguments: argparse.Namespace) -> Path:
+    state: Path = arguments.state or usual_state_folder(arguments.robot_id)
+    return state
+
+
+def _model(word: str) -> Model:
+    return shipped() if word == _SHIPPED else read_model(Path(word))
+
+
+def _dataset(folder: Path) -> Dataset:
+    dataset = read_dataset(folder)
+    check(dataset)
+    return dataset
+
+
+def _line(figures: Figures) -> str:
+    def said(name: str, key: str) -> str:
+        value = figures[name].get(key) if name in figures else None
+        return "–" if value is None else f"{value:.3f}"
+
+    return "; ".join(f"{name}: recall {said(name, 'recall')}, precision {said(name, 'precision')}" for name in DECISIVE)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
