@@ -703,6 +703,16 @@ def control_asked_by_you(user: str) -> None:
     """You have asked {user} for control."""
 
 
+@_reason("error", "")
+def server_unreachable() -> None:
+    """The server cannot be reached."""
+
+
+@_reason("error", "")
+def server_answered(status: float) -> None:
+    """The server answered {status:.0f}."""
+
+
 # Page: alarms
 
 

@@ -1,9 +1,10 @@
 // Panel with the alarms, errors first, each with what to do.
 
-import { clockWords, counted } from "../js/state/format.js";
+import { clockWords } from "../js/state/format.js";
 import { link, now, pageState, points } from "../js/state/page-state.js";
 import { partsOf, reasonText, severityOf } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
+import { counted, text } from "../js/state/texts.js";
 import { alarms } from "../js/views/alarms.js";
 import { element, setText } from "../js/views/dom.js";
 import { icon } from "../js/views/icons.js";
@@ -15,10 +16,10 @@ class RpAlarms extends HTMLElement {
   connectedCallback() {
     this.id = "alarms";
     const count = element("span", { class: "alarm-count number" });
-    const list = element("ul", { class: "alarm-list", attributes: { tabindex: "0", "aria-label": "Alarms" } });
+    const list = element("ul", { class: "alarm-list", attributes: { tabindex: "0", "aria-label": text("alarms.title") } });
     const live = element("div", { class: "live", attributes: { role: "log", "aria-live": "assertive" } }, list);
-    const empty = element("p", { class: "empty" }, element("span", { class: "calm" }, icon("present"), "No alarms"));
-    this.append(element("div", { class: "panel-head" }, element("h2", { text: "Alarms" }), count), live, empty);
+    const empty = element("p", { class: "empty" }, element("span", { class: "calm" }, icon("present"), text("alarms.none")));
+    this.append(element("div", { class: "panel-head" }, element("h2", { text: text("alarms.title") }), count), live, empty);
     /** @type {Map<string, { row: HTMLElement, text: Element, act: HTMLElement, seen: number }>} */
     const rows = new Map();
     drawOn([now, pageState, points, link], () => {
@@ -28,9 +29,9 @@ class RpAlarms extends HTMLElement {
         const known = rows.get(reason.code) ?? newRow(reason);
         rows.set(reason.code, known);
         known.seen = at;
-        const { text, act } = partsOf(reason);
-        setText(known.text, text);
-        setText(known.act, [act, ...steps.map(reasonText)].filter(Boolean).map(sentence).join(" "));
+        const parts = partsOf(reason);
+        setText(known.text, parts.text);
+        setText(known.act, [parts.act, ...steps.map(reasonText)].filter(Boolean).map(sentence).join(" "));
         known.act.dataset.steps = steps.map((step) => step.code).join(" ");
       }
       for (const [code, { row, seen }] of rows) {
@@ -50,7 +51,7 @@ class RpAlarms extends HTMLElement {
       }
       empty.hidden = rows.size > 0;
       this.dataset.worst = found[0] ? severityOf(found[0].reason) : "";
-      setText(count, rows.size > 0 ? counted(rows.size, "alarm") : "");
+      setText(count, rows.size > 0 ? counted("alarms.count", rows.size) : "");
     });
   }
 }
@@ -68,16 +69,16 @@ function sentence(words) {
 /** @param {import("../js/state/reasons.js").Reason} reason */
 function newRow(reason) {
   const severity = severityOf(reason);
-  const text = element("strong");
+  const words = element("strong");
   const act = element("span", { class: "act" });
-  const since = element("time", { text: clockWords(Date.now() / 1000), attributes: { title: "Since" } });
+  const since = element("time", { text: clockWords(Date.now() / 1000), attributes: { title: text("alarms.since") } });
   const row = element(
     "li",
     { data: { severity, code: reason.code } },
     icon(severity),
-    element("span", { class: "alarm-words" }, text, act),
+    element("span", { class: "alarm-words" }, words, act),
     since,
   );
-  return { row, text, act, seen: 0 };
+  return { row, text: words, act, seen: 0 };
 }
 customElements.define("rp-alarms", RpAlarms);

@@ -2,9 +2,10 @@
 
 import { placePoint, placing } from "../js/control/placing.js";
 import { selectAndReveal } from "../js/control/selection.js";
-import { POINT_WORDS, ageWords } from "../js/state/format.js";
+import { ageWords } from "../js/state/format.js";
 import { link, now, pageState, points, selected, staleWords } from "../js/state/page-state.js";
 import { drawOn, signal } from "../js/state/signals.js";
+import { labelOf, text } from "../js/state/texts.js";
 import { element, panelHead, setText, svg } from "../js/views/dom.js";
 
 /** @typedef {import("../js/link/messages.js").PagePoint} PagePoint */
@@ -88,25 +89,19 @@ class CameraMarks {
     }
     sign?.setAttribute("d", SIGNS[entry.state]);
     sign?.setAttribute("transform", `scale(${unit})`);
-    if (title) setText(title, `${point.point_id}: ${POINT_WORDS[entry.state]}`);
+    if (title) setText(title, `${point.point_id}: ${labelOf(entry.state)}`);
   }
 }
 
-/** Label and title of the image's source, by kind of bridge. */
-const SOURCES = {
-  sim: ["simulation", "The robot and its camera are simulated"],
-  fakes: ["fakes", "The real robot's drivers run on fakes of its devices; nothing real moves"],
-  real: ["", ""],
-};
 /** Age from which an image is stale (ms); images arrive at 2 Hz. */
 const OLD_MS = 2500;
 
 class RpCamera extends HTMLElement {
   constructor() {
     super();
-    this.image = element("img", { attributes: { alt: "What the camera at the tool sees" } });
-    this.overlay = svg("svg", { role: "group", "aria-label": "Pruning points in the image" });
-    this.empty = element("p", { class: "empty", text: "Waiting for the first image…", attributes: { role: "status" } });
+    this.image = element("img", { attributes: { alt: text("camera.image") } });
+    this.overlay = svg("svg", { role: "group", "aria-label": text("camera.points") });
+    this.empty = element("p", { class: "empty", text: text("camera.waiting"), attributes: { role: "status" } });
     this.picture = element("div", { class: "picture" }, this.image, this.empty);
     this.shownFrame = 0;
     this.frameAt = 0;
@@ -117,8 +112,8 @@ class RpCamera extends HTMLElement {
 
   connectedCallback() {
     const source = element("span", { class: "tag" });
-    const freeze = element("button", { id: "freeze", class: "quiet", text: "Freeze" });
-    const { head, note } = panelHead("Camera", source, freeze);
+    const freeze = element("button", { id: "freeze", class: "quiet", text: text("camera.freeze") });
+    const { head, note } = panelHead(text("camera.title"), source, freeze);
     this.picture.append(this.overlay);
     this.append(head, this.picture);
     this.image.hidden = true;
@@ -128,14 +123,14 @@ class RpCamera extends HTMLElement {
       const held = this.held.get() !== null;
       const age = performance.now() - this.frameAt;
       let words = staleWords("bridge");
-      if (!words && held) words = `frozen, ${ageWords(age / 1000)} old`;
-      else if (!words && this.frameAt > 0 && age > OLD_MS) words = `image ${ageWords(age / 1000)} old`;
+      if (!words && held) words = text("stale.frozen", { age: ageWords(age / 1000) });
+      else if (!words && this.frameAt > 0 && age > OLD_MS) words = text("stale.image", { age: ageWords(age / 1000) });
       setText(note, words);
       this.classList.toggle("stale", words !== "" && !held);
       this.classList.toggle("frozen", held);
-      const [name, about] = SOURCES[pageState.get()?.bridge?.kind ?? "real"];
-      setText(source, name);
-      source.title = about;
+      const kind = pageState.get()?.bridge?.kind ?? "real";
+      setText(source, text(`camera.${kind}`));
+      source.title = text(`camera.${kind}.hint`);
     });
 
     freeze.addEventListener("click", () => {
@@ -145,7 +140,7 @@ class RpCamera extends HTMLElement {
     drawOn([this.held], () => {
       const held = this.held.get() !== null;
       freeze.setAttribute("aria-pressed", String(held));
-      freeze.title = held ? "Show what the camera sees now" : "Hold this image still; the robot goes on";
+      freeze.title = text(held ? "camera.live_hint" : "camera.freeze_hint");
     });
     this.overlay.addEventListener("click", (event) => void this.clicked(event));
 
@@ -190,7 +185,7 @@ class RpCamera extends HTMLElement {
     });
     next.addEventListener("error", () => {
       this.loading = false;
-      if (this.image.hidden) setText(this.empty, "The image did not load; trying the next one.");
+      if (this.image.hidden) setText(this.empty, text("camera.failed"));
     });
     next.src = `camera/color.jpg?n=${frame}`;
   }

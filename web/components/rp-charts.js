@@ -3,9 +3,10 @@
 import { PROCESSES } from "../js/link/messages.js";
 import { ageWords } from "../js/state/format.js";
 import { drawOn, signal } from "../js/state/signals.js";
+import { text } from "../js/state/texts.js";
 import { element, setText } from "../js/views/dom.js";
 import { SPAN_MS, history, sampled } from "../js/views/history.js";
-import { READINGS } from "../js/views/readings.js";
+import { READINGS, beyondLimit } from "../js/views/readings.js";
 
 /** @typedef {{ at: number, value: number }} Sample */
 /**
@@ -187,11 +188,11 @@ export class RpCharts extends HTMLElement {
     this.shown = signal(history);
     this.isOpen = false;
     this.when = element("span", { class: "hint number", attributes: { role: "status" } });
-    this.pause = element("button", { id: "pause-charts", class: "quiet", text: "Pause" });
+    this.pause = element("button", { id: "pause-charts", class: "quiet", text: text("charts.pause") });
     /** @type {Node[]} */
     this.tools = [this.when, this.pause];
-    this.figures = READINGS.map((reading) => figure(reading.id, reading.label, reading.description));
-    this.presence = figure("presence", "Processes", PROCESSES.join(", "));
+    this.figures = READINGS.map((reading) => figure(reading.id, text(`reading.${reading.id}`), text(`reading.${reading.id}.hint`)));
+    this.presence = figure("presence", text("presence.label"), PROCESSES.join(", "));
   }
 
   connectedCallback() {
@@ -235,14 +236,14 @@ export class RpCharts extends HTMLElement {
   draw() {
     const paused = this.shown.get() !== history;
     this.pause.setAttribute("aria-pressed", String(paused));
-    setText(this.pause, paused ? "Go on" : "Pause");
+    setText(this.pause, text(paused ? "charts.go_on" : "charts.pause"));
     if (!this.isOpen) return;
     const shown = this.shown.get();
     const newest = shown.newest();
     const back = this.back.get();
     const pointed = back === null ? null : newest - back;
     const age = (performance.now() - (pointed ?? newest)) / 1000;
-    setText(this.when, pointed !== null || paused ? `${ageWords(Math.max(0, age))} ago` : "now");
+    setText(this.when, pointed !== null || paused ? text("charts.ago", { age: ageWords(Math.max(0, age)) }) : text("charts.now"));
     READINGS.forEach((reading, index) => {
       const each = this.figures[index];
       if (!each) return;
@@ -252,17 +253,15 @@ export class RpCharts extends HTMLElement {
       const found = sampleAt(samples, pointed ?? newest);
       const words = found ? `${reading.format(found.value)} ${reading.unit}`.trim() : "–";
       setText(each.value, words);
-      const over =
-        found !== null &&
-        (found.value > (reading.warnAbove ?? Infinity) || found.value < (reading.warnBelow ?? -Infinity));
+      const over = beyondLimit(reading, found?.value ?? null) !== "";
       each.box.classList.toggle("warned", over);
-      each.canvas.setAttribute("aria-label", `${reading.label}: ${words}${over ? ", beyond its limit" : ""}`);
+      each.canvas.setAttribute("aria-label", text(over ? "charts.beyond" : "charts.within", { label: text(`reading.${reading.id}`), words }));
     });
     const rows = PROCESSES.map((process) => shown.of(process));
     drawBands(this.presence.canvas, rows, newest, pointed);
     const there = rows.filter((row) => (sampleAt(row, pointed ?? newest)?.value ?? 0) > 0).length;
-    setText(this.presence.value, `${there} of ${PROCESSES.length}`);
-    this.presence.canvas.setAttribute("aria-label", `Processes that were there: ${there} of ${PROCESSES.length}`);
+    setText(this.presence.value, text("charts.there", { there, all: PROCESSES.length }));
+    this.presence.canvas.setAttribute("aria-label", text("charts.presence", { there, all: PROCESSES.length }));
   }
 }
 

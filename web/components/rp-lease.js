@@ -5,6 +5,7 @@ import { ask } from "../js/link/api.js";
 import { pageState, showToast } from "../js/state/page-state.js";
 import { reason, reasonText } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
+import { text } from "../js/state/texts.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
 
 /** A second press within this time confirms taking control from another person (ms). */
@@ -22,7 +23,7 @@ class RpLease extends HTMLElement {
 
   connectedCallback() {
     this.setAttribute("role", "group");
-    this.setAttribute("aria-label", "Control of the robot");
+    this.setAttribute("aria-label", text("control.label"));
     const words = element("span", { class: "control-words", attributes: { role: "status" } });
     this.append(words, this.give, this.request, this.take);
     drawOn([pageState], () => this.draw(words));
@@ -38,21 +39,22 @@ class RpLease extends HTMLElement {
     const mineAsked = asked !== "" && control?.requested_key === state?.client;
     const coming = control?.next_user ?? "";
     this.hidden = control === null || !((held && !mine) || asked || coming || (state?.viewers ?? 0) > 1);
-    const who = mine ? "You hold control" : held ? `${user} holds control` : "Nobody holds control";
-    setText(words, coming ? `Control goes to ${coming}` : mine && asked ? `${asked} asks for control` : who);
+    const who = mine ? text("control.yours") : held ? text("control.theirs", { user }) : text("control.nobody");
+    const waiting = mine && asked ? text("control.asked", { user: asked }) : who;
+    setText(words, coming ? text("control.goes", { user: coming }) : waiting);
     words.title = words.textContent ?? "";
     this.give.hidden = !(mine && asked !== "" && !coming);
-    setText(this.give, `Give to ${asked}`);
-    this.give.title = `${asked} moves the robot then; it stops first`;
+    setText(this.give, text("control.give", { user: asked }));
+    this.give.title = text("control.give_hint", { user: asked });
     this.request.hidden = !(operates && held && !mine && !coming);
-    setText(this.request, mineAsked ? "Asked" : "Ask");
+    setText(this.request, text(mineAsked ? "control.asked_already" : "control.ask"));
     const theirs = asked ? reason("control_requested", { user: asked }) : null;
     const waits = mineAsked ? reason("control_asked_by_you", { user }) : theirs;
-    setEnabled(this.request, waits, `Ask ${user} for control; nothing stops meanwhile`);
+    setEnabled(this.request, waits, text("control.ask_hint", { user }));
     this.take.hidden = !operates || mine || coming !== "";
     const sure = performance.now() < this.armed;
-    setText(this.take, !held ? "Take control" : sure ? "Really take it?" : "Take");
-    this.take.title = held ? `Takes control from ${user}: the robot stops first, and they are told` : "";
+    setText(this.take, text(!held ? "control.take_free" : sure ? "control.take_sure" : "control.take"));
+    this.take.title = held ? text("control.take_hint", { user }) : "";
     this.announceLoss(mine, control?.notice_number ?? 0, reasonText(control?.notice));
   }
 
@@ -61,7 +63,7 @@ class RpLease extends HTMLElement {
     const { held } = holder();
     if (held && performance.now() >= this.armed) {
       this.armed = performance.now() + CONFIRM_MS;
-      setText(this.take, "Really take it?");
+      setText(this.take, text("control.take_sure"));
       return;
     }
     this.armed = 0;
@@ -77,7 +79,7 @@ class RpLease extends HTMLElement {
    */
   announceLoss(mine, number, told) {
     if (this.told !== null && number !== this.told && this.mine && !mine)
-      showToast("warning", `You no longer hold control: ${told}`);
+      showToast("warning", text("control.lost", { why: told }));
     this.told = number;
     this.mine = mine;
   }

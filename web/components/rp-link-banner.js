@@ -1,8 +1,9 @@
 // Banner while the page has no link and shows the last known state.
 
-import { ageWords, counted } from "../js/state/format.js";
+import { ageWords } from "../js/state/format.js";
 import { isOpening, link, now, stateAge } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
+import { counted, text } from "../js/state/texts.js";
 import { element, setText } from "../js/views/dom.js";
 import { icon } from "../js/views/icons.js";
 
@@ -24,17 +25,14 @@ class RpLinkBanner extends HTMLElement {
       if (!shown) return;
       const age = stateAge();
       if (status === "signed-out") {
-        setText(title, "You are not signed in");
-        setText(
-          words,
-          "Each sign-in link works once: ask a supervisor who is signed in for a new one, or start the program again.",
-        );
+        setText(title, text("link.signed_out"));
+        setText(words, text("link.sign_in"));
       } else {
-        setText(title, "No link to the server");
-        const old = age === null ? "" : `What you see is ${ageWords(age)} old. `;
-        setText(words, `${old}Trying again by itself (${counted(attempts, "try", "tries")} so far).`);
+        setText(title, text("link.lost"));
+        const old = age === null ? [] : [text("link.old", { age: ageWords(age) })];
+        setText(words, [...old, counted("link.tries", attempts)].join(" "));
       }
-      setText(hint, "The software stop may not reach the robot from here: use the emergency stop on the robot.");
+      setText(hint, text("link.stop"));
     });
   }
 }

@@ -1,9 +1,9 @@
 // The mode, its phase and its reason.
 
-import { MODE_WORDS, PHASE_WORDS } from "../js/state/format.js";
 import { isLive, link, now, pageState } from "../js/state/page-state.js";
 import { reasonText } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
+import { text } from "../js/state/texts.js";
 import { element, setText } from "../js/views/dom.js";
 import { setIcon } from "../js/views/icons.js";
 
@@ -22,8 +22,8 @@ class RpMode extends HTMLElement {
       chip.dataset.mode = mode;
       chip.classList.toggle("stale", !isLive("controller"));
       setIcon(shape, mode || "UNKNOWN");
-      const phase = controller ? PHASE_WORDS[controller.phase] : "";
-      setText(word, controller ? MODE_WORDS[controller.mode] + (phase ? ` · ${phase}` : "") : "No state yet");
+      const phase = controller?.phase ? ` · ${text(`phase.${controller.phase}`)}` : "";
+      setText(word, text(`mode.${mode || "none"}`) + phase);
       setText(reason, reasonText(controller?.reason));
       reason.title = reason.textContent ?? "";
     });

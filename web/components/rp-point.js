@@ -4,7 +4,7 @@ import { accept, isUncertain, isUnknown, reject, whyNotAccept, whyNotReject } fr
 import { cutTime } from "../js/control/order.js";
 import { select, selectAndReveal } from "../js/control/selection.js";
 import { TEXT_MAX_LENGTH } from "../js/link/messages.js";
-import { POINT_WORDS, counted } from "../js/state/format.js";
+import { counted, labelOf } from "../js/state/texts.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
 import { icon, setIcon } from "../js/views/icons.js";
 import { reasonText } from "../js/state/reasons.js";
@@ -156,7 +156,7 @@ export class RpPoint extends HTMLElement {
     this.dataset.pointId = point.point_id;
     this.dataset.state = entry.state;
     setIcon(this.shape, entry.state);
-    setText(this.word, POINT_WORDS[entry.state]);
+    setText(this.word, labelOf(entry.state));
     setText(this.place, point.point_id);
     const thick = `${(2000 * point.radius).toFixed(1)} mm`;
     // Rounded down, so that a value shown as enough for "Accept all" is enough.
@@ -166,7 +166,7 @@ export class RpPoint extends HTMLElement {
       this.facts,
       `${point.nodes_kept}/${point.nodes_seen} nodes · ${thick} · ${isUncertain(row) ? "only " : ""}${sure}`,
     );
-    const kept = `Keeps ${point.nodes_kept} of ${counted(point.nodes_seen, "node")}`;
+    const kept = counted("point.keeps", point.nodes_seen, { kept: point.nodes_kept });
     this.facts.title = `${kept}; the cane is ${thick} thick; confidence ${sure}${planWords(row)}`;
     setText(this.reason, [planned, reasonText(entry.reason), reasonText(point.reason)].filter(Boolean).join(" · "));
     this.reason.title = this.reason.textContent ?? "";

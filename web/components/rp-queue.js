@@ -14,10 +14,10 @@ import {
 import { placing, setPlacing, whyNoPlacing } from "../js/control/placing.js";
 import { select } from "../js/control/selection.js";
 import { SURE } from "../js/link/messages.js";
-import { counted } from "../js/state/format.js";
 import { link, now, pageState, points, revealCount, selected, staleWords } from "../js/state/page-state.js";
 import { keyOf, reason } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
+import { counted, text } from "../js/state/texts.js";
 import { element, panelHead, setAttribute, setEnabled, setText } from "../js/views/dom.js";
 import { icon } from "../js/views/icons.js";
 import { undecidedList } from "../js/views/undecided-sites.js";
@@ -60,11 +60,8 @@ class RpQueue extends HTMLElement {
     const list = element("div", { class: "groups", attributes: { role: "group", "aria-label": "Pruning points" } });
     const empty = element("div", { class: "empty", attributes: { role: "status" } });
     const open = [
-      undecidedList(
-        "another look",
-        (count) => `${counted(count, "place")} ${count === 1 ? "needs" : "need"} another look`,
-      ),
-      undecidedList("operator", (count) => `${counted(count, "place")} for you to decide`),
+      undecidedList("another look", (count) => counted("queue.look", count)),
+      undecidedList("operator", (count) => counted("queue.decide", count)),
     ];
     list.addEventListener("keydown", (event) => this.key(event));
     list.addEventListener("reject", (event) => this.openRejectForm(/** @type {RpPoint} */ (event.target)));
@@ -322,9 +319,9 @@ function summaryWords(rows) {
 
 function emptyWords() {
   const page = points.get();
-  if (link.get().status !== "open") return "No points known.";
-  if (page === null || page.frames === 0) return "Looking for pruning points…";
-  return `No pruning point in ${counted(page.frames, "image")} so far. Still looking…`;
+  if (link.get().status !== "open") return text("queue.unknown");
+  if (page === null || page.frames === 0) return text("queue.looking");
+  return counted("queue.none", page.frames);
 }
 
 /**

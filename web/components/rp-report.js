@@ -1,17 +1,12 @@
 // The session report: cuts by outcome and vine, durations, refusals, and who held control.
 
-import { POINT_WORDS, clockWords } from "../js/state/format.js";
+import { clockWords } from "../js/state/format.js";
 import { reasonText } from "../js/state/reasons.js";
+import { labelOf, text } from "../js/state/texts.js";
 import { element, setText } from "../js/views/dom.js";
 
 /** @typedef {import("../js/link/messages.js").SessionReport} SessionReport */
 
-/** @type {Readonly<Record<string, string>>} */
-const CONTROL_WORDS = Object.freeze({
-  TakeControl: "took control",
-  GrantControl: "gave control to the person who had asked",
-  ReturnControl: "returned control",
-});
 /** Refresh period while open (ms); the controller publishes it every 5 s. */
 const AGAIN_MS = 5000;
 
@@ -93,7 +88,7 @@ export class RpReport extends HTMLElement {
           cut.ended_at > 0 ? clockWords(cut.ended_at) : "now",
           cut.point_id,
           cut.vine,
-          [cut.outcome ? POINT_WORDS[cut.outcome] : "Cutting", reasonText(cut.reason)].filter(Boolean).join(": "),
+          [labelOf(cut.outcome || "CUTTING"), reasonText(cut.reason)].filter(Boolean).join(": "),
           cut.ended_at > 0 ? cut.seconds.toFixed(1) : "–",
           cut.user,
         ]),
@@ -104,7 +99,7 @@ export class RpReport extends HTMLElement {
       "Nothing was refused.",
     );
     this.control.show(
-      [...report.control].reverse().map((each) => [clockWords(each.at), each.user, CONTROL_WORDS[each.asked]]),
+      [...report.control].reverse().map((each) => [clockWords(each.at), each.user, text(`report.${each.asked}`)]),
       "Control has not changed hands.",
     );
   }

@@ -3,9 +3,9 @@
 
 import { hold } from "../js/control/teleoperation.js";
 import { fetchJson } from "../js/link/api.js";
-import { MODE_WORDS } from "../js/state/format.js";
 import { showToast } from "../js/state/page-state.js";
 import { reasonText } from "../js/state/reasons.js";
+import { text } from "../js/state/texts.js";
 import { element, setText } from "../js/views/dom.js";
 import { SPAN_MS, history } from "../js/views/history.js";
 import { setIcon } from "../js/views/icons.js";
@@ -130,14 +130,15 @@ class RpRobots extends HTMLElement {
     const draw = (/** @type {Glance} */ robot) => {
       link.dataset.severity = robot.severity;
       setIcon(shape, robot.severity || robot.mode || "UNKNOWN");
-      const word = robot.mode === null ? "No state yet" : MODE_WORDS[robot.mode];
+      const word = text(`mode.${robot.mode ?? "none"}`);
       // No mode where the alarm names it.
       setText(mode, MODE_ALARMS.has(robot.alarm?.code ?? "") ? "" : word);
       setText(alarm, reasonText(robot.alarm));
-      setText(holder, robot.yours ? "You hold control" : robot.holder ? `${robot.holder} holds control` : "");
+      setText(holder, robot.yours ? text("control.yours") : robot.holder ? text("control.theirs", { user: robot.holder }) : "");
       const working = robot.mode === "AUTO" || robot.mode === "TELEOP";
-      const leaving = here && working ? ". Work pauses when nobody looks at this robot" : "";
-      link.title = `${here ? "Shown on this page" : `Show ${name}`}${robot.alarm ? `. ${alarm.textContent}` : ""}${leaving}`;
+      const told = [here ? text("robots.here") : text("robots.show", { name }), alarm.textContent ?? ""];
+      if (here && working) told.push(text("robots.leaving"));
+      link.title = told.filter(Boolean).join(". ");
     };
     this.rows.set(name, draw);
     return draw;
@@ -149,10 +150,10 @@ class RpRobots extends HTMLElement {
    * @param {Glance} robot
    */
   tell({ name, path, severity, alarm }) {
-    const text = reasonText(alarm);
-    if (path === location.pathname || this.told.get(name) === text) return;
-    this.told.set(name, text);
-    if (severity) showToast(severity, `${name}: ${text}`);
+    const words = reasonText(alarm);
+    if (path === location.pathname || this.told.get(name) === words) return;
+    this.told.set(name, words);
+    if (severity) showToast(severity, `${name}: ${words}`);
   }
 }
 customElements.define("rp-robots", RpRobots);

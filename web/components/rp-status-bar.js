@@ -15,6 +15,7 @@ import {
   stateAge,
 } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
+import { counted, text } from "../js/state/texts.js";
 import { element, setText } from "../js/views/dom.js";
 import { icon, setIcon } from "../js/views/icons.js";
 
@@ -35,15 +36,16 @@ class RpStatusBar extends HTMLElement {
   }
 
   presence() {
-    const box = element("div", { class: "presences", attributes: { role: "group", "aria-label": "Processes" } });
+    const box = element("div", { class: "presences", attributes: { role: "group", "aria-label": text("presence.label") } });
     for (const process of PROCESSES) {
+      const name = text(`process.${process}`);
       const shape = element("span", { class: "shape" });
       const age = element("span", { class: "age" });
       const chip = element(
         "span",
         { class: "presence", data: { process, present: "false" } },
         shape,
-        element("span", { class: "process-name", text: process }),
+        element("span", { class: "process-name", text: name }),
         age,
       );
       box.append(chip);
@@ -52,15 +54,15 @@ class RpStatusBar extends HTMLElement {
         // A silent server says nothing about the others.
         const unknown = process === "server" ? isOpening() : !isLive("server");
         const seconds = processAge(process);
-        const since = seconds === null ? "not seen" : `gone ${ageWords(seconds)}`;
+        const since = seconds === null ? text("presence.unseen") : text("presence.gone", { age: ageWords(seconds) });
         chip.dataset.present = unknown ? "unknown" : String(live);
         setIcon(shape, unknown ? "UNKNOWN" : live ? "present" : "gone");
         setText(age, live || unknown ? "" : since);
         chip.title = unknown
-          ? `${process}: ${isOpening() ? "not heard yet" : "not known without the server"}`
+          ? text(isOpening() ? "presence.not_heard" : "presence.unknown", { process: name })
           : live
-            ? `${process} is there`
-            : `${process}: ${since}`;
+            ? text("presence.there", { process: name })
+            : text("presence.told", { process: name, words: since });
       });
     }
     return box;
@@ -83,9 +85,9 @@ class RpStatusBar extends HTMLElement {
             : "good";
       setText(
         words,
-        open && trip !== null ? `${trip.toFixed(0)} ms · ${ageWords(age ?? 0)}` : opening ? "connecting…" : "no link",
+        open && trip !== null ? `${trip.toFixed(0)} ms · ${ageWords(age ?? 0)}` : text(opening ? "link.connecting" : "link.none"),
       );
-      chip.title = "Round trip between this page and the server, and the age of the newest state";
+      chip.title = text("link.hint");
     });
     return chip;
   }
@@ -93,17 +95,17 @@ class RpStatusBar extends HTMLElement {
   person() {
     const name = element("span", { class: "user-name" });
     const role = element("span", { class: "user-role" });
-    const leave = element("button", { id: "sign-out", class: "quiet", text: "Sign out" });
+    const leave = element("button", { id: "sign-out", class: "quiet", text: text("person.leave") });
     leave.addEventListener("click", async () => {
       const answer = await post("api/sign-out");
       if (answer.ok) location.replace("/");
-      else say("error", `Sign-out refused: ${answer.reason}`);
+      else say("error", text("refused", { what: text("person.leave"), why: answer.reason }));
     });
     drawOn([pageState], () => {
       const state = pageState.get();
       setText(name, state?.user ?? "");
-      setText(role, state && state.role !== state.user ? `· ${state.role}` : "");
-      name.title = state ? `${state.viewers} page${state.viewers === 1 ? "" : "s"} open now` : "";
+      setText(role, state && state.role !== state.user ? `· ${text(`role.${state.role}`)}` : "");
+      name.title = state ? counted("person.pages", state.viewers) : "";
     });
     return element("div", { class: "person" }, name, role, document.createElement("rp-invite"), leave);
   }

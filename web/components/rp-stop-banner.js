@@ -7,6 +7,7 @@ import { TEXT_MAX_LENGTH } from "../js/link/messages.js";
 import { isLive, link, now, pageState, staleWords } from "../js/state/page-state.js";
 import { reason, reasonText } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
+import { text } from "../js/state/texts.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
 import { icon, setIcon } from "../js/views/icons.js";
 
@@ -22,14 +23,14 @@ class RpStopBanner extends HTMLElement {
       attributes: {
         type: "text",
         maxlength: String(TEXT_MAX_LENGTH),
-        placeholder: "Why is it safe to go on?",
-        "aria-label": "Reason for the reset",
+        placeholder: text("stop.why_safe"),
+        "aria-label": text("stop.reset_reason"),
         autocomplete: "off",
       },
     });
-    const reset = element("button", { id: "reset", text: "Reset", attributes: { type: "submit" } });
+    const reset = element("button", { id: "reset", text: text("stop.reset"), attributes: { type: "submit" } });
     const form = element("form", {}, words, reset);
-    const hint = element("p", { class: "hint", text: "The reset moves nothing: arm and start again afterwards." });
+    const hint = element("p", { class: "hint", text: text("stop.reset_moves_nothing") });
     form.addEventListener("submit", async (event) => {
       event.preventDefault();
       // With the id of the stop shown: a newer one must not be reset unseen.
@@ -37,7 +38,7 @@ class RpStopBanner extends HTMLElement {
       if (await ask("Reset", "api/reset", body)) words.value = "";
     });
     this.append(
-      element("div", { class: "banner-head" }, icon("ESTOP_LATCHED"), element("h2", { text: "Software stop" }), who),
+      element("div", { class: "banner-head" }, icon("ESTOP_LATCHED"), element("h2", { text: text("stop.idle") }), who),
       element("ul", { class: "acknowledgements" }, bridge.row, controller.row),
       earlier,
       form,
@@ -57,7 +58,7 @@ class RpStopBanner extends HTMLElement {
       // Without a link no reset is possible, and two banners leave little of the view.
       form.hidden = hint.hidden = link.get().status !== "open";
       const told = state?.bridge?.stopped_by ?? (byController ? state?.controller?.reason : null);
-      setText(who, reasonText(told) || "Pressed on this page; waiting for the robot to say so");
+      setText(who, reasonText(told) || text("stop.pressed_here"));
       const newest = state?.bridge?.stop_id ?? "";
       bridge.show(byBridge, sinceWords(state, "bridge", newest));
       controller.show(byController, sinceWords(state, "controller", newest));
@@ -66,7 +67,7 @@ class RpStopBanner extends HTMLElement {
       setText(earlier, before);
       const pressed = hardwareStopPressed(state) ? reason("emergency_stop_pressed") : null;
       const why = pressed ?? whyNot("Reset") ?? (words.value.trim() === "" ? reason("reset_unexplained") : null);
-      setEnabled(reset, why, "Release the latched stop; nothing moves");
+      setEnabled(reset, why, text("stop.reset_hint"));
     };
     words.addEventListener("input", draw);
     drawOn([pageState, link, now, stopProgress], draw);
@@ -93,7 +94,9 @@ function acknowledgement(process) {
       row.dataset.acknowledged = String(latched);
       setIcon(shape, latched ? "present" : "warning");
       const old = isLive(process) ? "" : ` (${staleWords(process)})`;
-      setText(words, `${process}: ${latched ? `stopped and latched${since}` : "not confirmed yet"}${old}`);
+      const name = text(`process.${process}`);
+      const told = latched ? text("stop.latched", { process: name, since }) : text("stop.unconfirmed", { process: name });
+      setText(words, told + old);
     },
   };
 }

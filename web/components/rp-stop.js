@@ -2,16 +2,9 @@
 
 import { multiRobot, stopProgress, stopRobot } from "../js/control/stop.js";
 import { drawOn } from "../js/state/signals.js";
+import { text } from "../js/state/texts.js";
 import { element, setText } from "../js/views/dom.js";
 import { icon } from "../js/views/icons.js";
-
-/** @type {Readonly<Record<import("../js/control/stop.js").StopProgress, string>>} */
-const WORDS = Object.freeze({
-  idle: "Software stop",
-  sending: "Stopping…",
-  sent: "Software stop",
-  failed: "Not reached — press again",
-});
 
 class RpStop extends HTMLElement {
   connectedCallback() {
@@ -22,7 +15,7 @@ class RpStop extends HTMLElement {
         id: "stop",
         attributes: {
           "aria-keyshortcuts": "Space",
-          title: `Stops base and arm${multiRobot ? " of every robot" : ""}. Space bar does the same.`,
+          title: text(multiRobot ? "stop.all_hint" : "stop.hint"),
         },
       },
       icon("ESTOP_LATCHED"),
@@ -30,7 +23,7 @@ class RpStop extends HTMLElement {
         "span",
         { class: "stop-words" },
         label,
-        element("small", { text: multiRobot ? "all robots · space bar" : "space bar" }),
+        element("small", { text: text(multiRobot ? "stop.all_key" : "stop.key") }),
       ),
     );
     // On pointerdown, so that a finger that slides off has still stopped the robot.
@@ -42,7 +35,7 @@ class RpStop extends HTMLElement {
       if (event.detail === 0) void stopRobot("stop button");
     });
     this.append(button);
-    drawOn([stopProgress], () => setText(label, WORDS[stopProgress.get()]));
+    drawOn([stopProgress], () => setText(label, text(`stop.${stopProgress.get()}`)));
   }
 }
 customElements.define("rp-stop", RpStop);

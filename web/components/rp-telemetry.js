@@ -1,8 +1,8 @@
 // Telemetry gauges: tracking error, margins to limits, timing.
 
-import { counted } from "../js/state/format.js";
 import { isLive, link, now, pageState, staleWords } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
+import { counted, text } from "../js/state/texts.js";
 import { element, panelHead, setText, svg } from "../js/views/dom.js";
 import { READINGS, beyondLimit } from "../js/views/readings.js";
 import { drawerButton } from "./rp-drawer.js";
@@ -27,9 +27,9 @@ class RpGauge extends HTMLElement {
   init(kind) {
     this.kind = kind;
     this.dataset.gauge = kind.id;
-    this.title = kind.description;
+    this.title = text(`reading.${kind.id}.hint`);
     this.setAttribute("role", "meter");
-    this.setAttribute("aria-label", kind.label);
+    this.setAttribute("aria-label", text(`reading.${kind.id}`));
     this.setAttribute("aria-valuemin", "0");
     this.setAttribute("aria-valuemax", String(kind.fullScale));
     const trend = svg(
@@ -38,7 +38,7 @@ class RpGauge extends HTMLElement {
       this.line,
     );
     this.append(
-      element("span", { class: "label", text: kind.label }),
+      element("span", { class: "label", text: text(`reading.${kind.id}`) }),
       element("span", { class: "trend-cell" }, trend, this.warning),
       element("span", { class: "reading" }, this.value, element("span", { class: "unit", text: kind.unit })),
       element("span", { class: "bar" }, this.fill),
@@ -54,8 +54,8 @@ class RpGauge extends HTMLElement {
     this.fill.style.setProperty("width", `${(100 * fraction).toFixed(1)}%`);
     const side = beyondLimit(kind, value);
     this.dataset.warning = side;
-    setText(this.warning, side === "low" ? "▾ low" : side === "high" ? "▴ high" : "");
-    this.setAttribute("aria-valuetext", value === null ? "unknown" : `${kind.format(value)} ${kind.unit}`);
+    setText(this.warning, text(`telemetry.${side}`));
+    this.setAttribute("aria-valuetext", value === null ? text("telemetry.unknown") : `${kind.format(value)} ${kind.unit}`);
     this.setAttribute("aria-valuenow", value === null ? "0" : String(Math.min(kind.fullScale, Math.max(0, value))));
   }
 
@@ -82,7 +82,7 @@ const SHOWN = READINGS.filter((reading) => reading.place !== "chart");
 
 class RpTelemetry extends HTMLElement {
   connectedCallback() {
-    const { head, note } = panelHead("Telemetry", drawerButton("charts", "Charts"));
+    const { head, note } = panelHead(text("telemetry.title"), drawerButton("charts", text("telemetry.charts")));
     const title = element("summary");
     const engineers = element("details", { class: "engineers" }, title);
     this.append(head);
@@ -104,7 +104,7 @@ class RpTelemetry extends HTMLElement {
       const battery = gauges[SHOWN.findIndex((reading) => reading.id === "battery")];
       if (battery) battery.hidden = state.bridge?.kind === "sim";
       const warnings = gauges.filter((gauge) => gauge.parentElement === engineers && gauge.dataset.warning).length;
-      setText(title, `For engineers${warnings > 0 ? ` · ${counted(warnings, "warning")}` : ""}`);
+      setText(title, warnings > 0 ? counted("telemetry.warnings", warnings) : text("telemetry.engineers"));
     });
     drawOn([now, link], () => {
       const words = staleWords("bridge", "controller");
@@ -114,7 +114,7 @@ class RpTelemetry extends HTMLElement {
       gauges.forEach((gauge, index) => gauge.addSample(live ? (values[index] ?? null) : null));
     });
     gauges.forEach((gauge) => gauge.show(null));
-    setText(title, "For engineers");
+    setText(title, text("telemetry.engineers"));
   }
 }
 

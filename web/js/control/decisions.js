@@ -2,9 +2,9 @@
 
 import { ask } from "../link/api.js";
 import { SURE } from "../link/messages.js";
-import { counted } from "../state/format.js";
 import { points, say } from "../state/page-state.js";
 import { signal } from "../state/signals.js";
+import { counted } from "../state/texts.js";
 import { whyNot, whyNotPoint, whyNothingOf } from "./allowed.js";
 import { reason, saidText } from "../state/reasons.js";
 
@@ -86,7 +86,7 @@ export async function acceptAll() {
   const open = confidentPoints();
   const done = await ask("Accepting all", "api/points/accept-all", { confidence: SURE });
   if (done) {
-    pushUndo(`accepted ${counted(open.length, "point")}`, async () => {
+    pushUndo(counted("undo.accepted", open.length), async () => {
       // Points that were cut or decided again since are left alone.
       const accepted = open.map((row) => now(row)).filter(isAccepted);
       const back = await Promise.all(accepted.map((row) => row && send(row, "Taking back", "reconsider", {})));

@@ -1,9 +1,9 @@
 // The order of work: its points, who set it, and changing it.
 
 import { ask } from "../link/api.js";
-import { counted } from "../state/format.js";
 import { pageState, points } from "../state/page-state.js";
 import { reason } from "../state/reasons.js";
+import { counted, text } from "../state/texts.js";
 import { countOf, whyNot, whyNotPoint } from "./allowed.js";
 
 /** @typedef {import("../link/messages.js").PagePoint} PagePoint */
@@ -23,12 +23,12 @@ function orderedBy() {
 export function orderWords() {
   const rows = workOrder();
   const beyond = countOf("UNREACHABLE");
-  const more = beyond > 0 ? ` · ${beyond} cannot be reached` : "";
-  if (rows.length === 0) return `Order of work: nothing ${beyond > 0 ? "to work on" : "accepted"}${more}`;
+  const more = beyond > 0 ? ` · ${text("order.beyond", { count: beyond })}` : "";
+  if (rows.length === 0) return text(beyond > 0 ? "order.none_left" : "order.none_accepted") + more;
   const plan = points.get()?.plan;
   const long = plan?.state === "valid" ? `, ${durationWords(plan.duration_s)}` : "";
-  const whose = orderedBy() ? `by ${orderedBy()}` : "by the plan";
-  return `Order of work: ${counted(rows.length, "point")}, ${whose}${long}${more}`;
+  const whose = orderedBy() ? text("order.by", { user: orderedBy() }) : text("order.by_plan");
+  return `${counted("order.points", rows.length)}, ${whose}${long}${more}`;
 }
 
 /** @param {number} seconds */

@@ -4,6 +4,7 @@ import { post } from "../link/api.js";
 import { clockWords } from "../state/format.js";
 import { say } from "../state/page-state.js";
 import { signal } from "../state/signals.js";
+import { text } from "../state/texts.js";
 
 /** @typedef {import("../link/messages.js").PageState} PageState */
 /** @typedef {import("../link/messages.js").StopRecord} StopRecord */
@@ -35,8 +36,7 @@ export async function stopRobot(reason) {
     if (answer.status === 401 || unconfirmed > 1) break;
   }
   stopProgress.set("failed");
-  const what = unconfirmed > 0 ? "is not confirmed" : "did not get through";
-  say("error", `The software stop ${what} (${refusal}). Use the emergency stop on the robot.`);
+  say("error", text(unconfirmed > 0 ? "stop.not_confirmed" : "stop.not_through", { why: refusal }));
 }
 
 /**
@@ -97,7 +97,7 @@ function latchedBy(state, process) {
 export function sinceWords(state, process, stopId) {
   const records = latchedBy(state, process);
   const record = records.find((each) => each.stop_id === stopId) ?? records[0];
-  return record ? ` at ${clockWords(record.wall_time)}` : "";
+  return record ? ` ${text("stop.since", { time: clockWords(record.wall_time) })}` : "";
 }
 
 /**
@@ -109,8 +109,9 @@ export function earlierWords(state) {
   const earlier = latchedBy(state, "bridge").slice(1);
   if (earlier.length === 0) return "";
   const told = earlier.slice(0, 3).map((stop) => `${stop.user || stop.source}, ${clockWords(stop.wall_time)}`);
-  const more = earlier.length > told.length ? ` and ${earlier.length - told.length} more` : "";
-  return `Before that: ${told.join("; ")}${more}`;
+  const more = earlier.length - told.length;
+  const stops = told.join("; ");
+  return more > 0 ? text("stop.earlier_more", { stops, more }) : text("stop.earlier", { stops });
 }
 
 /**

@@ -1,7 +1,8 @@
 // REST requests. Every refusal is shown and logged.
 
 import { link, say, showToast } from "../state/page-state.js";
-import { reasonText } from "../state/reasons.js";
+import { reason, reasonText } from "../state/reasons.js";
+import { text } from "../state/texts.js";
 
 /**
  * `status` is 0 if the server was not reached; `link` answers an invitation.
@@ -27,7 +28,7 @@ export async function post(path, body = {}, timeoutMs = 4000) {
       signal: AbortSignal.timeout(timeoutMs),
     });
   } catch {
-    return { ok: false, reason: "the server cannot be reached", status: 0 };
+    return { ok: false, reason: reasonText(reason("server_unreachable")), status: 0 };
   }
   if (response.status === 401) link.set({ status: "signed-out", attempts: 0 });
   return { ...(await answerOf(response)), status: response.status };
@@ -44,7 +45,7 @@ export async function post(path, body = {}, timeoutMs = 4000) {
 export async function ask(what, path, body) {
   const answer = await post(path, body);
   if (answer.ok) return true;
-  const words = `${what} refused: ${answer.reason}`;
+  const words = text("refused", { what, why: answer.reason });
   // Refusals (409) and timeouts (503) of the controller reach the log through the server; others are logged here.
   if (answer.status === 409) showToast("warning", words);
   else if (answer.status === 503) showToast("error", words);
@@ -88,10 +89,9 @@ async function answerOf(response) {
   } catch {
     // Not JSON: the status has to do.
   }
-  const text = typeof body?.reason === "string" ? body.reason : detailOf(body);
-  const reason = typeof body?.code === "string" ? reasonText(reasonOf(body)) : text;
-  if (response.ok) return { ok: body?.ok !== false, reason, link: typeof body?.link === "string" ? body.link : "" };
-  return { ok: false, reason: reason || STATUS_WORDS[response.status] || `the server answered ${response.status}` };
+  const told = typeof body?.code === "string" ? reasonText(reasonOf(body)) : (body?.reason ?? "");
+  if (response.ok) return { ok: body?.ok !== false, reason: told, link: typeof body?.link === "string" ? body.link : "" };
+  return { ok: false, reason: told || reasonText(reason("server_answered", { status: response.status })) };
 }
 
 /**
@@ -104,24 +104,3 @@ function reasonOf({ code, values }) {
   const plain = Object.entries(values ?? {}).map(([name, value]) => [name, value?.code ? reasonOf(value) : value]);
   return { code, values: /** @type {[string, string|number][]} */ (plain) };
 }
-
-/**
- * Text of a validation error.
- *
- * @param {any} body
- * @returns {string}
- */
-function detailOf(body) {
-  if (typeof body?.detail === "string") return body.detail;
-  if (Array.isArray(body?.detail)) return body.detail.map((/** @type {any} */ each) => each?.msg ?? "").join("; ");
-  return "";
-}
-
-/** @type {Readonly<Record<number, string>>} */
-const STATUS_WORDS = Object.freeze({
-  401: "you are not signed in",
-  403: "you may not do this",
-  409: "not possible now",
-  422: "the request is invalid",
-  503: "the controller does not answer",
-});

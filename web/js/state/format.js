@@ -1,51 +1,6 @@
-// Text for modes, states, ages, units and numbers.
+// Text for ages, units and numbers.
 
-/** @type {Readonly<Record<import("../link/messages.js").PointState, string>>} */
-export const POINT_WORDS = Object.freeze({
-  PROPOSED: "Proposed",
-  ACCEPTED: "Accepted",
-  UNREACHABLE: "Cannot reach",
-  CUTTING: "Cutting",
-  DONE: "Done",
-  FAILED_NOT_CUT: "Not cut",
-  UNKNOWN: "Unknown",
-  REJECTED: "Rejected",
-});
-
-/** @type {Readonly<Record<import("../link/messages.js").Mode, string>>} */
-export const MODE_WORDS = Object.freeze({
-  IDLE: "Idle",
-  READY: "Ready",
-  TELEOP: "Teleoperation",
-  AUTO: "Automatic",
-  PAUSED: "Paused",
-  PROTECTIVE_STOP: "Protective stop",
-  FAULT: "Fault",
-  ESTOP_LATCHED: "Stopped",
-});
-
-/** @type {Readonly<Record<import("../link/messages.js").Phase, string>>} */
-export const PHASE_WORDS = Object.freeze({
-  "": "",
-  APPROACH: "approach",
-  CLOSE_UP: "closer look",
-  ADVANCE: "advance",
-  CUT: "cut",
-  RETREAT: "retreat",
-  SURVEY: "survey",
-});
-
-/** @type {Readonly<Record<string, string>>} */
-const RAW_WORDS = Object.freeze({ ...MODE_WORDS, ...POINT_WORDS });
-
-/**
- * The label of a mode or state; other names as they are.
- *
- * @param {string} name
- */
-export function labelOf(name) {
-  return RAW_WORDS[name] ?? name;
-}
+import { text } from "./texts.js";
 
 /**
  * The nearest obstacle; empty if nothing is near.
@@ -54,7 +9,7 @@ export function labelOf(name) {
  */
 export function nearWords(controller) {
   const near = controller?.proximity ?? null;
-  return near === null ? "" : `${(near.distance * 1000).toFixed(0)} mm between ${near.what}.`;
+  return near === null ? "" : text("near", { distance: (near.distance * 1000).toFixed(0), what: near.what });
 }
 
 /** @param {number} seconds */
@@ -73,15 +28,6 @@ export function millimetres(metres) {
 /** @param {number} radians */
 export function degrees(radians) {
   return (radians * (180 / Math.PI)).toFixed(1);
-}
-
-/**
- * @param {number} count
- * @param {string} one
- * @param {string} [many]
- */
-export function counted(count, one, many = `${one}s`) {
-  return `${count} ${count === 1 ? one : many}`;
 }
 
 const CLOCK = new Intl.DateTimeFormat("en-GB", { hour: "2-digit", minute: "2-digit", second: "2-digit" });

@@ -2,6 +2,7 @@
 
 import { ageWords } from "./format.js";
 import { signal } from "./signals.js";
+import { text } from "./texts.js";
 
 /** @typedef {import("../link/messages.js").PageEvent} PageEvent */
 /** @typedef {import("../link/messages.js").PagePoints} PagePoints */
@@ -171,17 +172,18 @@ export function isLive(process) {
 export function staleWords(...processes) {
   if (link.get().status !== "open") {
     const age = stateAge();
-    return age === null ? "" : `no link — last state ${ageWords(age)} old`;
+    return age === null ? "" : text("stale.no_link", { age: ageWords(age) });
   }
   if (pageState.get() === null) return "";
   // A silent server says nothing about the others.
   const silence = stateAge() ?? 0;
-  if (!isLive("server")) return `server silent — last state ${ageWords(silence)} old`;
+  if (!isLive("server")) return text("stale.server", { age: ageWords(silence) });
   for (const process of processes) {
     if (isLive(process)) continue;
-    const age = processAge(process);
-    if (age === null) return `${process} not seen yet`;
-    return `${process} ${isGone(process) ? "gone" : "not heard in time"} — last state ${ageWords(age)} old`;
+    const seconds = processAge(process);
+    const name = text(`process.${process}`);
+    if (seconds === null) return text("stale.unseen", { process: name });
+    return text(isGone(process) ? "stale.gone" : "stale.late", { process: name, age: ageWords(seconds) });
   }
   return "";
 }

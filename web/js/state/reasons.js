@@ -1,13 +1,13 @@
 // Reasons as text for people.
 
-import { labelOf } from "./format.js";
+import { labelOf, loaded } from "./texts.js";
 
 /**
  * Severity, text and advice of each reason, by its code; generated.
  *
  * @type {Readonly<Record<string, readonly [import("../link/messages.js").Severity, string, string]>>}
  */
-const REASONS = await (await fetch(new URL("../../text/reasons.en.json", import.meta.url))).json();
+const REASONS = await loaded("reasons");
 
 /** @typedef {{code: string, values: readonly (readonly [string, string|number|Reason])[]}} Reason */
 

@@ -35,10 +35,8 @@ class BaseSpeed {
 
 /**
  * @typedef {object} Reading
- * @property {string} id
- * @property {string} label
+ * @property {string} id Of its texts too: `reading.ID` and `reading.ID.hint`.
  * @property {string} unit
- * @property {string} description
  * @property {number} fullScale Upper end of the bar, in the unit shown.
  * @property {number} [warnAbove]
  * @property {number} [warnBelow]
@@ -54,9 +52,7 @@ const speed = new BaseSpeed();
 export const READINGS = Object.freeze([
   {
     id: "position-error",
-    label: "Tool error",
     unit: "mm",
-    description: "Distance of the tool from where its trajectory has it now",
     fullScale: 20,
     warnAbove: 10,
     format: (/** @type {number} */ value) => millimetres(value / 1000),
@@ -64,9 +60,7 @@ export const READINGS = Object.freeze([
   },
   {
     id: "rotation-error",
-    label: "Tool angle",
     unit: "°",
-    description: "Angle of the tool from where its trajectory has it now",
     fullScale: 10,
     warnAbove: 5,
     format: (/** @type {number} */ value) => degrees(value / DEGREE),
@@ -75,9 +69,7 @@ export const READINGS = Object.freeze([
   {
     id: "manipulability",
     place: "engineer",
-    label: "Manipulability",
     unit: "ω",
-    description: "How freely the arm can move the tool; 0 is a singular posture",
     fullScale: 0.15,
     warnBelow: 0.02,
     format: (/** @type {number} */ value) => value.toFixed(3),
@@ -85,9 +77,7 @@ export const READINGS = Object.freeze([
   },
   {
     id: "joint-margin",
-    label: "Joint margin",
     unit: "°",
-    description: "Least distance of an arm joint to its limit",
     fullScale: 60,
     warnBelow: 5,
     format: (/** @type {number} */ value) => value.toFixed(1),
@@ -95,18 +85,14 @@ export const READINGS = Object.freeze([
   },
   {
     id: "base-speed",
-    label: "Base speed",
     unit: "m/s",
-    description: "Speed of the base over the ground, from its wheels",
     fullScale: 0.5,
     format: (/** @type {number} */ value) => value.toFixed(2),
     read: (/** @type {PageState} */ state) => speed.update(state.base, state.joints),
   },
   {
     id: "battery",
-    label: "Battery",
     unit: "%",
-    description: "Charge of the base's battery",
     fullScale: 100,
     warnBelow: 20,
     format: (/** @type {number} */ value) => value.toFixed(0),
@@ -114,9 +100,7 @@ export const READINGS = Object.freeze([
   },
   {
     id: "real-time-factor",
-    label: "Real time",
     unit: "×",
-    description: "Simulated seconds a second; below 0.9 the computer is too slow and everything happens later",
     fullScale: 1.2,
     warnBelow: 0.9,
     format: (/** @type {number} */ value) => value.toFixed(2),
@@ -125,9 +109,7 @@ export const READINGS = Object.freeze([
   {
     id: "tick",
     place: "engineer",
-    label: "Control step",
     unit: "µs",
-    description: "Median time of one control step over the last second",
     fullScale: 1000,
     warnAbove: 1000,
     format: (/** @type {number} */ value) => value.toFixed(0),
@@ -136,9 +118,7 @@ export const READINGS = Object.freeze([
   {
     id: "late-ticks",
     place: "engineer",
-    label: "Late steps",
     unit: "",
-    description: "Control periods that came too late since the controller started",
     fullScale: 100,
     format: (/** @type {number} */ value) => value.toFixed(0),
     read: (/** @type {PageState} */ state) => state.controller?.late_ticks ?? null,
@@ -146,9 +126,7 @@ export const READINGS = Object.freeze([
   {
     id: "wheel-speed",
     place: "chart",
-    label: "Wheel speed",
     unit: "%",
-    description: "Speed of the faster wheel in parts of its limit",
     fullScale: 100,
     warnAbove: 95,
     format: (/** @type {number} */ value) => value.toFixed(0),
@@ -157,9 +135,7 @@ export const READINGS = Object.freeze([
   {
     id: "arm-speed",
     place: "chart",
-    label: "Arm speed",
     unit: "%",
-    description: "Speed of the fastest joint of the arm in parts of its limit",
     fullScale: 100,
     warnAbove: 95,
     format: (/** @type {number} */ value) => value.toFixed(0),
@@ -168,9 +144,7 @@ export const READINGS = Object.freeze([
   {
     id: "command-round-trip",
     place: "chart",
-    label: "Command round trip",
     unit: "ms",
-    description: "From a joint state of the robot to the command that answers it, median of the last second",
     fullScale: 50,
     warnAbove: 50,
     format: (/** @type {number} */ value) => value.toFixed(1),
@@ -179,9 +153,7 @@ export const READINGS = Object.freeze([
   {
     id: "page-round-trip",
     place: "chart",
-    label: "Page round trip",
     unit: "ms",
-    description: "From this page to the server and back",
     fullScale: 200,
     warnAbove: 200,
     format: (/** @type {number} */ value) => value.toFixed(0),
