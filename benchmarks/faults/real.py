@@ -37,12 +37,19 @@ _INJECTED = ("collision", "20 packets lost in a row")
 
 @dataclass(frozen=True)
 class Fault:
-    """What goes wrong, which word of the page's log names it, and how it ends."""
+    """What goes wrong, the code that the page's log has for it, how it begins and ends, and the device's own words."""
 
     name: str
-    word: str
+    code: str
     begin: Callable[[RealSite], None]
     end: Callable[[RealSite], None] = lambda site: None
+    words: str = ""
+
+    def named_by(self, reason: m.Reason) -> bool:
+        """Whether a line of the log, or a cause in it, is about this."""
+        causes = [value for _, value in reason.values if isinstance(value, m.Reason)]
+        here = reason.code == self.code and self.words in str(reason.values)
+        return here or any(map(self.named_by, causes))
 
 
 @dataclass(frozen=True)
@@ -74,18 +81,23 @@ def _tells(line: str) -> Callable[[RealSite], None]:
 
 
 FAULTS = (
-    Fault("no commands any more", "no valid setpoint", lambda site: None),
+    Fault("no commands any more", "setpoints_missing", lambda site: None),
     Fault(
         "the arm's callback stalls",
-        "no state from its control box",
+        "arm_silent",
         lambda site: site.arm_process().suspend(),
         lambda site: site.arm_process().resume(),
     ),
-    Fault("25 packets in a row are lost", "communication_constraints_violation", _tells("arm drop 25")),
-    Fault("a reflex of the arm", "reflex", _tells("arm collide")),
-    Fault("the arm's user stop", "user stop", _tells("arm press"), _tells("arm free")),
-    Fault("no wheel speeds from the base", "no wheel speeds", _tells(f"base mute {mp500.WHEELS}"), _tells("base free")),
-    Fault("the base's emergency stop", "emergency stop", _tells("base press"), _tells("base free")),
+    Fault(
+        "25 packets in a row are lost",
+        "device_fault",
+        _tells("arm drop 25"),
+        words="communication_constraints_violation",
+    ),
+    Fault("a reflex of the arm", "device_fault", _tells("arm collide"), words="reflex"),
+    Fault("the arm's user stop", "arm_user_stopped", _tells("arm press"), _tells("arm free")),
+    Fault("no wheel speeds from the base", "base_silent", _tells(f"base mute {mp500.WHEELS}"), _tells("base free")),
+    Fault("the base's emergency stop", "base_stopped", _tells("base press"), _tells("base free")),
 )
 
 
@@ -174,7 +186,7 @@ def trial(site: RealSite, commander: Commander, fault: Fault) -> Trial | None:
     commander.silent = fault is FAULTS[0]
     commander.run(_WATCHED_S, moving=True)
     after, now = site.tell(), time.monotonic()
-    told = any(fault.word in line for line in site.told_on_the_page()[before:])
+    told = any(map(fault.named_by, site.told_on_the_page()[before:]))
     base = now - after["base"]["still_s"] - at if after["base"]["still_s"] >= 0.0 else float("inf")
     arm = 1e-3 * (after["arm"]["moved_tick"] - ticks)
     still = after["arm"]["still_s"] >= 0.0

@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import msgspec
 import psutil
 
+from rolling_panda.messages.types import Reason
 from rolling_panda.resources import resource
 from tests.support.processes.local_router import free_port, local_router
 from tests.support.processes.processes import Processes
@@ -63,9 +65,10 @@ class RealSite(Processes):
         answer: dict[str, dict[str, Any]] = json.loads(self.answer("fakes", line))
         return answer
 
-    def told_on_the_page(self) -> list[str]:
+    def told_on_the_page(self) -> list[Reason]:
         """Lines of the page's log, oldest first."""
-        return [str(row["text"]) for row in self._page.get("/api/events").json()["events"]]
+        rows = self._page.get("/api/events").json()["events"]
+        return [msgspec.convert(row["reason"], Reason) for row in rows if row["reason"] is not None]
 
     def arm_process(self) -> psutil.Process:
         """The process with libfranka's loop."""

@@ -148,7 +148,8 @@ def test_a_reflex_stops_it_until_a_person_releases_it(arm: Panda, box: DevicePro
         until(turns(box, TURN))
         box.tell("collide")
         until(lambda: arm.read().severe)
-        assert arm.read().fault.code == "arm_reflex" and "joint_reflex" in words(arm)
+        fault = arm.read().fault
+        assert fault is not None and fault.code == "device_fault" and "joint_reflex" in words(arm)
         hand.turn(500)
         assert box.tell()["mode"] == REFLEX
         assert box.tell()["recoveries"] == 0
