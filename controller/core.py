@@ -47,7 +47,6 @@ from rolling_panda.config import RobotConfig
 from rolling_panda.errors import ControlError
 from rolling_panda.messages.perception import CloseUpRequest, CloseUpResult, Obstacles
 from rolling_panda.messages.supervision import StopRecord
-from rolling_panda.reasons import said
 from rolling_panda.transport.inbox import Answered, Inbox, Rejected, Reply, Request
 
 _STATE_S = 0.05
@@ -201,7 +200,7 @@ class Controller:
         told = [reasons.message_rejected(each.topic, each.reason) for each in rejected]
         for answered in inbox.drain(Answered):
             if not answered.message.answer.ok:
-                told.append(reasons.release_refused(answered.message.answer.reason or said("")))
+                told.append(reasons.release_refused(answered.message.answer.reason or reasons.unexplained()))
         return [m.LogEvent(header=m.Header(now), process="controller", reason=reason) for reason in told]
 
     def answer(self, intent: intents.Intent, now: float) -> m.Answer:

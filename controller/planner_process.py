@@ -136,7 +136,7 @@ def _plan(connection: Connection, config: ControllerConfig, robot_config: RobotC
         try:
             made = rollout.roll(request) if isinstance(request, PreviewRequest) else planner.plan(request)
         except RollingPandaError as error:
-            made = _failed(request, reasons.said(str(error)))
+            made = _failed(request, reasons.motion_failed(str(error)))
         connection.send(made)
 
 

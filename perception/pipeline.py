@@ -264,7 +264,7 @@ class Perception:
         for point in self._tracker.points():
             if distance(np.array(point.position), found[0].position) < _DUPLICATE:
                 return _refused(reasons.point_there_already(point.point_id, 1000 * _DUPLICATE))
-        return _done(reasons.said(self._tracker.add(Proposal(*found)).point_id))
+        return _done(reasons.point_placed(self._tracker.add(Proposal(*found)).point_id))
 
     def _move(self, request: MovePoint) -> m.Answer:
         point = next((each for each in self._tracker.points() if each.point_id == request.point_id), None)

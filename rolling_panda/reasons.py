@@ -58,11 +58,6 @@ def severity_of(reason: Reason) -> Severity:
     return "warning" if entry is None else entry.severity
 
 
-def noted(severity: Severity, text: str) -> Reason:
-    """Words for the log as a reason of a severity."""
-    return {"info": said, "warning": warned, "error": failed}[severity](text)
-
-
 def with_reason(stored: Any, field: str = "reason") -> Any:
     """A decoded row or stop whose field is a reason as data; earlier versions stored text."""
     if isinstance(stored, dict) and isinstance(text := stored.get(field), str):
@@ -116,13 +111,8 @@ def said(text: str) -> None:
 
 
 @_reason("warning", "")
-def warned(text: str) -> None:
-    """{text}."""
-
-
-@_reason("error", "")
-def failed(text: str) -> None:
-    """{text}."""
+def unexplained() -> None:
+    """No reason was given."""
 
 
 # Control and roles
@@ -1107,6 +1097,16 @@ def robot_unknown(robot: str, robots: str) -> None:
     """There is no robot {robot} here; there are: {robots}."""
 
 
+@_reason("info", "")
+def rule_effect(changed: float, removed: float, added: float, voided: float) -> None:
+    """{changed:.0f} changed, {removed:.0f} removed, {added:.0f} added; acceptances void: {voided:.0f}."""
+
+
+@_reason("info", "")
+def rule_without_effect() -> None:
+    """Nothing would change."""
+
+
 @_reason("warning", "accept the points again")
 def acceptances_not_restored(cause: Reason) -> None:
     """The rule is restored, its acceptances are not: {cause}."""
@@ -1163,6 +1163,11 @@ def origin_foreign() -> None:
 
 
 @_reason("warning", "")
+def origin_missing(path: str) -> None:
+    """Refused {path} without an origin."""
+
+
+@_reason("warning", "")
 def origin_refused(path: str, origin: str) -> None:
     """Refused {path} from origin {origin}."""
 
@@ -1175,6 +1180,16 @@ def visitor_rate_exceeded() -> None:
 @_reason("warning", "send less")
 def body_too_long(limit: float) -> None:
     """A request body has at most {limit:.0f} bytes."""
+
+
+@_reason("warning", "")
+def body_unreadable() -> None:
+    """The body is not JSON in UTF-8."""
+
+
+@_reason("warning", "")
+def http_error(status: float, detail: str) -> None:
+    """HTTP status {status:.0f}: {detail}."""
 
 
 @_reason("warning", "")
@@ -1375,6 +1390,16 @@ def too_many_connections() -> None:
 @_reason("warning", "")
 def connection_refused(address: str, whose: str) -> None:
     """Refused a connection from {address}: too many of {whose} are in use."""
+
+
+@_reason("warning", "")
+def connection_refused_of_all(address: str) -> None:
+    """Refused a connection from {address}: too many of all addresses together are in use."""
+
+
+@_reason("warning", "")
+def connection_replaced_of_all() -> None:
+    """Too many connections of all addresses together: the longest idle one was ended."""
 
 
 @_reason("warning", "")
@@ -1657,6 +1682,11 @@ def canes_too_narrow(width: float, needed: float) -> None:
 
 
 # Perception: points by hand and the rule
+
+
+@_reason("info", "look at it in the queue")
+def point_placed(point: str) -> None:
+    """{point} is placed."""
 
 
 @_reason("warning", "drive there, with Survey for instance, and click again")
@@ -2174,6 +2204,11 @@ def survey_blind() -> None:
 @_reason("info", "")
 def surveyed(vines: float, spurs: float, points: float, unclear: float, asking: float) -> None:
     """Vines {vines:.0f}, spurs {spurs:.0f}, points {points:.0f} seen; {unclear:.0f} unclear, {asking:.0f} to decide."""
+
+
+@_reason("info", "")
+def looked_again_without_point(vine: float, spur: float) -> None:
+    """Looked again at vine {vine:.0f}, spur {spur:.0f}: nothing is left open, and there is nothing to cut."""
 
 
 @_reason("info", "")

@@ -160,8 +160,9 @@ async def _http_error(request: Request, error: Exception) -> JSONResponse:
         return answer(Result(500))
     if error.status_code == 400:
         # FastAPI's response to bytes that are not UTF-8.
-        return answer(Result(422, reasons.request_invalid("the body is not JSON in UTF-8")))
-    told = error.reason if isinstance(error, RefusedError) else reasons.said(str(error.detail)[:400])
+        return answer(Result(422, reasons.body_unreadable()))
+    words = str(error.detail)[:400]
+    told = error.reason if isinstance(error, RefusedError) else reasons.http_error(error.status_code, words)
     response = answer(Result(error.status_code, told))
     response.headers.update(error.headers or {})
     if error.status_code == 405:

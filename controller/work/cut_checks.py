@@ -132,7 +132,7 @@ def not_as_accepted(close_up: CloseUpResult, ticket: Ticket | None, tolerance: f
 
 
 def _why(close_up: CloseUpResult) -> Reason:
-    return close_up.reason or reasons.said("")
+    return close_up.reason or reasons.unexplained()
 
 
 def camera_ready(robot: Measured, motion: ToolMotion, config: WorkConfig) -> bool:

@@ -156,8 +156,10 @@ def looked_again(perceived: m.PruningPoints, place: m.UndecidedSite) -> m.Reason
     """Result of a site."""
     left = open_place(perceived, place.vine, place.spur)
     shown = [point.point_id for point in perceived.points if (point.vine, point.spur) == (place.vine, place.spur)]
+    if left is None and not shown:
+        return reasons.looked_again_without_point(place.vine, place.spur)
     if left is None:
-        return reasons.looked_again(place.vine, place.spur, ", ".join(shown) or "none")
+        return reasons.looked_again(place.vine, place.spur, ", ".join(shown))
     made = reasons.looked_again_asks if left.needs == "operator" else reasons.looked_again_unclear
     return made(place.vine, place.spur, left.reason)
 

@@ -19,7 +19,6 @@ from rolling_panda import reasons
 from rolling_panda.closing import Closing
 from rolling_panda.config import TransportConfig
 from rolling_panda.errors import ServiceError, TransportError
-from rolling_panda.reasons import said
 from rolling_panda.topics import Service, Topic, key
 from rolling_panda.transport.access import ONLOOKER
 from rolling_panda.transport.codec import StrictDecoder, UndecodableError, encode
@@ -244,7 +243,7 @@ class Transport(Onlooker):
             try:
                 answer = self.call(service, request)
             except ServiceError as error:
-                answer = m.Answer(ok=False, reason=said(str(error)))
+                answer = m.Answer(ok=False, reason=reasons.service_silent(service.server, str(error)))
             done(answer)
 
         threading.Thread(target=call, daemon=True).start()

@@ -236,18 +236,13 @@ class Invite(_Body):
 
 
 class Outcome(BaseModel):
-    """Success, and a message."""
+    """Success, and why it was refused or what was done: as text, and as a code of the catalogue with its values.
+
+    A value that is an object is the cause, with its own code and values. Without a reason there is no code.
+    """
 
     ok: bool
     reason: str
-
-
-class Refusal(Outcome):
-    """Why a command was refused: as text, and as a code of the catalogue with its values where it has one.
-
-    A value that is an object is the cause, with its own code and values.
-    """
-
     code: str = ""
     values: dict[str, str | float | dict[str, Any]] = {}
 

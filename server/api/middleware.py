@@ -141,7 +141,8 @@ class SecurityMiddleware:
         origins = [value.decode("latin-1") for name, value in scope["headers"] if name == b"origin"]
         if len(origins) == 1 and origins[0] in self._origins:
             return True
-        self._on_refusal(reasons.origin_refused(scope["path"][:80], ", ".join(origins)[:80] or "none"))
+        path, named = scope["path"][:80], ", ".join(origins)[:80]
+        self._on_refusal(reasons.origin_refused(path, named) if named else reasons.origin_missing(path))
         return False
 
 

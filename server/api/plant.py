@@ -13,7 +13,7 @@ from rolling_panda.messages.types import RuleEffect
 from server.api import bodies as body
 from server.api.bodies import fields_of
 from server.api.dependencies import Caller, Operator, PointId
-from server.api.responses import COMMAND, INVALID, NOT_FOUND, answer, query
+from server.api.responses import COMMAND, INVALID, NOT_FOUND, answer, outcome, query
 from server.robots.commands import Result
 from server.robots.context import RobotContext
 
@@ -43,7 +43,7 @@ def plant_router(robot: RobotContext) -> APIRouter:
         result = await robot.commands.ask_perception(session, wanted)
         if not result.ok or result.effect is None:
             return answer(result)
-        return JSONResponse(rule_outcome(result.effect, robot.pages.points).model_dump())
+        return JSONResponse(rule_outcome(result.effect, robot.pages.points))
 
     @router.post("/rule/undo", responses=COMMAND)
     async def undo(session: Operator, rule: RuleBody) -> Response:
@@ -57,7 +57,7 @@ def plant_router(robot: RobotContext) -> APIRouter:
             return answer(done)
         restored = await robot.commands.ask(session, ask.RestoreAccepted(user=session.user, rule=rule))
         if not restored.ok:
-            cause = restored.reason or reasons.said("")
+            cause = restored.reason or reasons.unexplained()
             return answer(Result(restored.status, reasons.acceptances_not_restored(cause)))
         return answer(done)
 
@@ -85,15 +85,12 @@ def plant_router(robot: RobotContext) -> APIRouter:
     return router
 
 
-def rule_outcome(effect: RuleEffect, points: PagePoints | None) -> body.RuleOutcome:
-    """The effect of a rule and the acceptances that it would void, as numbers and as text."""
+def rule_outcome(effect: RuleEffect, points: PagePoints | None) -> dict[str, Any]:
+    """The effect of a rule and the acceptances that it would void, as numbers and as a reason."""
     rows = () if points is None else points.points
     accepted = {row.point.point_id for row in rows if row.entry.state in ("ACCEPTED", "UNREACHABLE")}
     voided = len(accepted & {*effect.changed, *effect.removed})
     changed, removed, added = len(effect.changed), len(effect.removed), effect.added
-    parts = [f"{changed} {'changes' if changed == 1 else 'change'}"] if changed else []
-    parts += [f"{removed} {'goes' if removed == 1 else 'go'}"] if removed else []
-    parts += [f"{added} {'comes' if added == 1 else 'come'}"] if added else []
-    parts += [f"{voided} {'acceptance' if voided == 1 else 'acceptances'} would be void"] if voided else []
-    reason = ", ".join(parts) or "nothing would change"
-    return body.RuleOutcome(ok=True, reason=reason, changed=changed, removed=removed, added=added, voided=voided)
+    some = changed or removed or added or voided
+    told = reasons.rule_effect(changed, removed, added, voided) if some else reasons.rule_without_effect()
+    return outcome(True, told) | {"changed": changed, "removed": removed, "added": added, "voided": voided}

@@ -14,8 +14,8 @@ from server.robots.commands import Result
 Responses = dict[int | str, dict[str, Any]]
 
 
-def _outcome(status: int, description: str, model: type[body.Outcome] = body.Outcome) -> Responses:
-    return {status: {"model": model, "description": description}}
+def _outcome(status: int, description: str) -> Responses:
+    return {status: {"model": body.Outcome, "description": description}}
 
 
 _DONE = _outcome(200, "Done.")
@@ -31,7 +31,7 @@ SIGN_OUT = _DONE | SIGNED_IN | _FOREIGN
 COMMAND = (
     SIGN_OUT
     | _outcome(403, "The role may not, or the Origin header is missing or foreign.")
-    | _outcome(409, "Refused in the present state; `reason` says why.", body.Refusal)
+    | _outcome(409, "Refused in the present state; `reason` says why.")
     | INVALID
     | _outcome(503, "The responsible process does not answer.")
 )
@@ -50,16 +50,15 @@ def query(content: type[msgspec.Struct] | str, *others: Responses) -> Responses:
 
 
 def answer(result: Result) -> JSONResponse:
-    """A result as `{ok, reason}`, with `code` and `values` of a refusal."""
+    """A result as `{ok, reason}`, with `code` and `values` of the reason."""
     return JSONResponse(outcome(result.ok, result.reason), result.status)
 
 
 def outcome(ok: bool, reason: Reason | None = None) -> dict[str, Any]:
-    """The body of an answer: `reason` is English text; a refusal has its code and values too."""
-    content: dict[str, Any] = {"ok": ok, "reason": "" if reason is None else text_of(reason)}
-    if reason is not None and not ok:
-        content |= _as_data(reason)
-    return content
+    """The body of an answer: `reason` as English text, and as code and values."""
+    if reason is None:
+        return {"ok": ok, "reason": ""}
+    return {"ok": ok, "reason": text_of(reason)} | _as_data(reason)
 
 
 class RefusedError(HTTPException):

@@ -86,11 +86,12 @@ class Connections:
             # A client that has had an answer is less likely to be part of a flood of idle connections.
             address = new.address if crowded else ""
             idle = self._first_idle(address, served=False) or self._first_idle(address, served=True)
-            whose = new.address if crowded else "all addresses together"
             if idle is None:
-                self.note(reasons.connection_refused(new.address, whose), new.address)
+                one, of_all = reasons.connection_refused(new.address, new.address), reasons.connection_refused_of_all
+                self.note(one if crowded else of_all(new.address), new.address)
                 return False
-            self.note(reasons.connection_replaced(whose), new.address)
+            one = reasons.connection_replaced(new.address)
+            self.note(one if crowded else reasons.connection_replaced_of_all(), new.address)
             self.gone(idle)
             idle.end()
         if new.peer in self._open:

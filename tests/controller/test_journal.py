@@ -73,9 +73,9 @@ def test_what_is_said_is_told_once_and_recorded():
     journal = Journal()
     lines = EventLogger(journal)
     lines.now = 3.0
-    lines.log(reasons.warned("x" * 600))
+    lines.log(reasons.said("x" * 600))
     (told,) = lines.drain()
-    assert (told.header.stamp, told.process, told.reason) == (3.0, "controller", reasons.warned("x" * 500))
+    assert (told.header.stamp, told.process, told.reason) == (3.0, "controller", reasons.said("x" * 500))
     assert lines.drain() == ()
     assert [record.body for record in journal.drain()] == [told]
 

@@ -151,7 +151,7 @@ def tool_ahead(r):
     [
         ((), ("p7",), reasons.looked_again(1, 2, "p7")),
         ((reasons.canes_at_same_height(),), (), reasons.looked_again_asks(1, 2, reasons.canes_at_same_height())),
-        ((), (), reasons.looked_again(1, 2, "none")),
+        ((), (), reasons.looked_again_without_point(1, 2)),
     ],
 )
 def test_what_came_of_the_look_is_told(undecided_sites, points, says):

@@ -19,6 +19,7 @@ from rolling_panda.messages.supervision import (
     StopState,
 )
 from rolling_panda.reasons import said
+from server.api.responses import outcome
 from tests.support import controller_at_work
 from tests.support.fake_wire import (
     FakeWire,
@@ -94,7 +95,7 @@ def client(server):
 )
 def test_each_request_becomes_its_intent(server, client, path, body, intent):
     answer = client.post(f"/api/{path}", json=body)
-    assert (answer.status_code, answer.json()) == (200, {"ok": True, "reason": "done"})
+    assert (answer.status_code, answer.json()) == (200, outcome(True, said("done")))
     (asked,) = server.wire.asked
     # The role comes from the session, whatever a request says; the client is a key that is not the cookie's.
     assert asked.role == "supervisor" and asked.client and asked.client not in server.cookie(client)

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from rolling_panda import reasons
 from server.robots.event_log import BURST, RATE_HZ, EventLog, LogRateLimiter
 
-HELD, REFUSED = reasons.said("held"), reasons.warned("refused")
+HELD, REFUSED = reasons.said("held"), reasons.unexplained()
 
 
 def filled(lines, count):

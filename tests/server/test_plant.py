@@ -3,7 +3,7 @@
 import pytest
 
 from rolling_panda import messages as m
-from rolling_panda import topics
+from rolling_panda import reasons, topics
 from rolling_panda.commands import (
     AddPoint,
     AddPointInImage,
@@ -15,9 +15,12 @@ from rolling_panda.commands import (
 )
 from rolling_panda.errors import ServiceError
 from rolling_panda.messages.perception import PointCrop
-from rolling_panda.reasons import said
+from rolling_panda.reasons import said, text_of
+from server.api.responses import outcome
 from tests.support.fake_wire import FakeWire, controller_state, pruning_point, pruning_points
 from tests.support.running_server import eventually, running_server
+
+PLACED = reasons.point_placed("p9")
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +32,7 @@ def running():
 @pytest.fixture
 def server(running):
     running.wire.asked.clear()
-    running.wire.answer = lambda request: m.Answer(ok=True, reason=said("p9"))
+    running.wire.answer = lambda request: m.Answer(ok=True, reason=PLACED)
     return running
 
 
@@ -63,10 +66,10 @@ def server(running):
 def test_each_request_goes_to_perception(server, path, body, request_):
     with server.client(user="ann") as client:
         answer = client.post(f"/api/{path}", json=body)
-        assert (answer.status_code, answer.json()) == (200, {"ok": True, "reason": "p9"})
+        assert (answer.status_code, answer.json()) == (200, outcome(True, PLACED))
         assert server.wire.asked == [request_]
         events = client.get("/api/events").json()["events"]
-        assert events[-1]["text"] == f"{type(request_).__name__} by ann: p9"
+        assert events[-1]["text"] == f"{type(request_).__name__} by ann: {text_of(PLACED)}"
 
 
 @pytest.mark.parametrize(
@@ -127,7 +130,9 @@ def test_what_a_rule_would_change_is_told_with_the_acceptances_and_nothing_is_lo
             200,
             {
                 "ok": True,
-                "reason": "3 change, 1 goes, 2 come, 3 acceptances would be void",
+                "reason": text_of(reasons.rule_effect(3, 1, 2, 3)),
+                "code": "rule_effect",
+                "values": {"changed": 3.0, "removed": 1.0, "added": 2.0, "voided": 3.0},
                 "changed": 3,
                 "removed": 1,
                 "added": 2,
@@ -137,7 +142,7 @@ def test_what_a_rule_would_change_is_told_with_the_acceptances_and_nothing_is_lo
         assert server.wire.asked == [EvaluateRule(user="ann", rule=m.PruningRule(nodes_kept=3))]
         assert len(client.get("/api/events").json()["events"]) == events
         server.wire.answer = lambda request: m.Answer(ok=True, effect=m.RuleEffect())
-        assert client.post("/api/rule/what-if", json={}).json()["reason"] == "nothing would change"
+        assert client.post("/api/rule/what-if", json={}).json()["code"] == "rule_without_effect"
 
 
 def test_a_rule_is_taken_back_by_perception_first_and_then_its_acceptances_by_the_controller(server):

@@ -4,12 +4,14 @@ import msgspec
 import pytest
 from playwright.sync_api import Page, expect
 
+from rolling_panda import reasons
 from rolling_panda.messages import page as p
+from server.api.responses import outcome
 from tests.support.played_page import box_of, until
 from tests.support.played_server import PlayedServer, point
 
 pytestmark = pytest.mark.browser
-PLACED = (200, {"ok": True, "reason": "p9"})
+PLACED = (200, outcome(True, reasons.point_placed("p9")))
 
 
 def click_image(page: Page, u: float, v: float) -> None:

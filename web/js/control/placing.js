@@ -32,9 +32,10 @@ export function setPlacing(on) {
 export async function placePoint(path, body) {
   const answer = await post(path, body);
   if (answer.ok) {
-    select(answer.reason);
-    showToast("info", `${answer.reason} is placed: look at it in the queue.`);
-    return answer.reason;
+    const point = String(answer.values?.point ?? "");
+    select(point);
+    showToast("info", answer.reason);
+    return point;
   }
   const words = `No point placed: ${answer.reason}`;
   if (answer.status === 409) showToast("warning", words);

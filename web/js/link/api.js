@@ -5,9 +5,9 @@ import { reason, reasonText } from "../state/reasons.js";
 import { text } from "../state/texts.js";
 
 /**
- * `status` is 0 if the server was not reached; `link` answers an invitation.
+ * `status` is 0 if the server was not reached; `values` are those of the reason by name; `link` answers an invitation.
  *
- * @typedef {{ ok: boolean, reason: string, status: number, link?: string }} Answer
+ * @typedef {{ ok: boolean, reason: string, status: number, values?: Record<string, any>, link?: string }} Answer
  */
 
 /**
@@ -79,7 +79,7 @@ export async function isSignedIn() {
 
 /**
  * @param {Response} response
- * @returns {Promise<{ ok: boolean, reason: string, link?: string }>}
+ * @returns {Promise<{ ok: boolean, reason: string, values?: Record<string, any>, link?: string }>}
  */
 async function answerOf(response) {
   /** @type {any} */
@@ -90,7 +90,8 @@ async function answerOf(response) {
     // Not JSON: the status has to do.
   }
   const told = typeof body?.code === "string" ? reasonText(reasonOf(body)) : (body?.reason ?? "");
-  if (response.ok) return { ok: body?.ok !== false, reason: told, link: typeof body?.link === "string" ? body.link : "" };
+  const given = { values: body?.values ?? {}, link: typeof body?.link === "string" ? body.link : "" };
+  if (response.ok) return { ok: body?.ok !== false, reason: told, ...given };
   return { ok: false, reason: told || reasonText(reason("server_answered", { status: response.status })) };
 }
 
