@@ -137,12 +137,32 @@ def segment_photograph(
     """
     scaled = photograph.scaled(FIRST_WIDTH)
     found = segmenter.classify_surely(scaled.color, scaled.depth)
-    width = cane_width(found[0])
-    wanted = _MAX_WIDTH if width is None else min(_MAX_WIDTH, int(FIRST_WIDTH * _WIDE_CANE / width))
+    wanted = _wide_enough(found[0])
     if wanted <= FIRST_WIDTH or scaled is photograph:
         return scaled, found
     scaled = photograph.scaled(wanted)
     return scaled, segmenter.classify_surely(scaled.color, scaled.depth)
+
+
+def photograph_width(own: int, labels: Labels) -> int:
+    """Width (px) at which `segment_photograph` would segment a photograph whose classes are known.
+
+    Args:
+        own: Width of the photograph (px).
+        labels: H×W, at any scale.
+    """
+    if own <= FIRST_WIDTH:
+        return own
+    first = Image.fromarray(labels).resize(
+        (FIRST_WIDTH, max(1, round(labels.shape[0] * FIRST_WIDTH / labels.shape[1]))), Image.Resampling.NEAREST
+    )
+    return min(own, max(FIRST_WIDTH, _wide_enough(np.asarray(first))))
+
+
+def _wide_enough(labels: Labels) -> int:
+    """The greatest width (px) at which canes are not too wide, from classes at the first width."""
+    width = cane_width(labels)
+    return _MAX_WIDTH if width is None else min(_MAX_WIDTH, int(FIRST_WIDTH * _WIDE_CANE / width))
 
 
 def cane_width(labels: Labels) -> float | None:

@@ -10,22 +10,14 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-
-from perception.dataset.dataset import PICTURES, UNLABELLED, Dataset, check, read_dataset
-from perception.models.cards import Figures, Model, choose, choose_shipped, chosen, kept, read_model, shipped
-from perception.models.judge import SAME, TOGETHER, Agreement, compared, tell
-from perception.segmentation.frame import BACKGROUND
+from perception.dataset.dataset import Dataset, check, read_dataset
+from perception.models.cards import Model, choose, choose_shipped, chosen, kept, read_model, shipped
+from perception.models.judge import DECISIVE, TOLERANCE, Figures, judge_held_out, worse
 from perception.segmentation.network_segmenter import NetworkSegmenter
-from perception.single_image import SureSegmenter, load_photograph
 from rolling_panda.errors import InputError, RollingPandaError
 from rolling_panda.runtime.process import ROBOT_ID
 from rolling_panda.runtime.state_folder import usual_state_folder
 
-#: A pixel matches one that is at most so far away (px of the photograph).
-TOLERANCE = 3.0
-#: The classes whose F may not fall, and by how much it may: a difference of rounding.
-DECISIVE, _ROUNDING = ("cane", "trunk and cordon"), 0.005
 _SHIPPED = "shipped"
 
 
@@ -63,36 +55,6 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def judge(segmenter: SureSegmenter, dataset: Dataset) -> Figures:
-    """How well a network tells the classes of a dataset's held-out pictures; `bench photographs` measures the same.
-
-    Raises:
-        InputError: The dataset has no held-out picture, or one that cannot be used.
-    """
-    names = dataset.names("held-out")
-    if not names:
-        raise InputError(f"{dataset.folder} holds no picture out; import it with --held-out 0.2")
-    totals = {name: Agreement() for name in (*SAME, *TOGETHER)}
-    for name in names:
-        _, labels = dataset.load(name)
-        told, likely = tell(load_photograph(dataset.folder / PICTURES / name), segmenter)
-        told = np.where(labels == UNLABELLED, BACKGROUND, told).astype(np.uint8)
-        truth = {kind: np.isin(labels, same) for kind, same in SAME.items()}
-        for kind, true, said in compared(truth, told):
-            totals[kind].add(true, said, TOLERANCE, likely)
-    return {kind: total.figures() for kind, total in totals.items()}
-
-
-def worse(old: Figures, new: Figures) -> list[str]:
-    """Of the decisive classes that the pictures show, those at which the new network is worse, with both F."""
-    out = []
-    for name in DECISIVE:
-        before, after = old[name]["f"], new[name]["f"]
-        if old[name]["recall"] is not None and (after or 0.0) < (before or 0.0) - _ROUNDING:
-            out.append(f"{name} {after or 0.0:.3f} instead of {before or 0.0:.3f}")
-    return out
-
-
 def _list(arguments: argparse.Namespace) -> None:
     state = _state(arguments)
     used = chosen(state) or shipped()
@@ -112,7 +74,7 @@ def _compare(arguments: argparse.Namespace) -> None:
     dataset = _dataset(arguments.data)
     for word in (arguments.first, arguments.second):
         model = _model(word)
-        print(f"{model.title:32} {_line(judge(NetworkSegmenter(model.path), dataset))}")
+        print(f"{model.title:32} {_line(judge_held_out(NetworkSegmenter(model.path), dataset))}")
     print(f"on {len(dataset.names('held-out'))} held-out pictures of {dataset.folder}, tolerance {TOLERANCE:g} px")
 
 
@@ -125,8 +87,8 @@ def _use(arguments: argparse.Namespace) -> None:
     if arguments.data is None:
         raise InputError("give --data with a dataset of held-out pictures, to compare with the network in use")
     model, used, dataset = _model(arguments.model), chosen(state) or shipped(), _dataset(arguments.data)
-    old = judge(NetworkSegmenter(used.path), dataset)
-    new = judge(NetworkSegmenter(model.path), dataset)
+    old = judge_held_out(NetworkSegmenter(used.path), dataset)
+    new = judge_held_out(NetworkSegmenter(model.path), dataset)
     print(f"in use  {used.title:32} {_line(old)}\nnew     {model.title:32} {_line(new)}")
     if losses := worse(old, new):
         raise InputError(

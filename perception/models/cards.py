@@ -6,6 +6,7 @@ from pathlib import Path
 
 import msgspec
 
+from perception.models.judge import Figures
 from perception.segmentation.segmenter import SHIPPED
 from rolling_panda.errors import ConfigError, InputError
 from rolling_panda.resources import resource
@@ -13,8 +14,6 @@ from rolling_panda.runtime.state_folder import open_state_folder, read_kept, rep
 
 #: In the state folder: which network is used, and the folder of networks that were taken into use.
 CHOICE, KEPT = "model.json", "models"
-#: Of a set of pictures: by class, recall, precision and the other figures of `Agreement`.
-Figures = dict[str, dict[str, float | None]]
 
 
 class Data(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -7,14 +7,22 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion, distance_transform_edt
 
 from perception.arrays import Labels, Mask
-from perception.segmentation.frame import CANE, CORDON, NODE, OLD_CUT, SPUR, TRUNK
-from perception.single_image import Photograph, SureSegmenter, segment_photograph
+from perception.dataset.dataset import PICTURES, UNLABELLED, Dataset
+from perception.segmentation.frame import BACKGROUND, CANE, CORDON, NODE, OLD_CUT, SPUR, TRUNK
+from perception.single_image import Photograph, SureSegmenter, load_photograph, segment_photograph
+from rolling_panda.errors import InputError
 
 #: Classes of people's masks that are compared, and the program's classes that are the same wood.
 SAME = {"trunk": (TRUNK,), "cane": (CANE, NODE, SPUR), "cordon": (CORDON, OLD_CUT)}
 #: Also compared as one class, since people draw the border between them anywhere.
 TOGETHER = {"trunk and cordon": ("trunk", "cordon"), "wood": ("trunk", "cane", "cordon")}
 
+#: A pixel matches one that is at most so far away (px of the photograph).
+TOLERANCE = 3.0
+#: The classes whose F may not fall, and by how much it may: a difference of rounding.
+DECISIVE, _ROUNDING = ("cane", "trunk and cordon"), 0.005
+#: Of a set of pictures: by class, recall, precision and the other figures of `Agreement`.
+Figures = dict[str, dict[str, float | None]]
 #: Bins of probability for the calibration error.
 _BINS = 10
 
@@ -111,6 +119,36 @@ def tell(photograph: Photograph, segmenter: SureSegmenter) -> tuple[Labels, NDAr
     cols = ((np.arange(width) + 0.5) * labels.shape[1] / width).astype(int)
     window = np.ix_(rows, cols)
     return labels[window], None if likely is None else likely[window]
+
+
+def judge_held_out(segmenter: SureSegmenter, dataset: Dataset) -> Figures:
+    """How well a network tells the classes of a dataset's held-out pictures; `bench photographs` measures the same.
+
+    Raises:
+        InputError: The dataset has no held-out picture, or one that cannot be used.
+    """
+    names = dataset.names("held-out")
+    if not names:
+        raise InputError(f"{dataset.folder} holds no picture out; import it with --held-out 0.2")
+    totals = {name: Agreement() for name in (*SAME, *TOGETHER)}
+    for name in names:
+        _, labels = dataset.load(name)
+        told, likely = tell(load_photograph(dataset.folder / PICTURES / name), segmenter)
+        told = np.where(labels == UNLABELLED, BACKGROUND, told).astype(np.uint8)
+        truth = {kind: np.isin(labels, same) for kind, same in SAME.items()}
+        for kind, true, said in compared(truth, told):
+            totals[kind].add(true, said, TOLERANCE, likely)
+    return {kind: total.figures() for kind, total in totals.items()}
+
+
+def worse(old: Figures, new: Figures) -> list[str]:
+    """Of the decisive classes that the pictures show, those at which the new network is worse, with both F."""
+    out = []
+    for name in DECISIVE:
+        before, after = old[name]["f"], new[name]["f"]
+        if old[name]["recall"] is not None and (after or 0.0) < (before or 0.0) - _ROUNDING:
+            out.append(f"{name} {after or 0.0:.3f} instead of {before or 0.0:.3f}")
+    return out
 
 
 def edge(mask: Mask) -> Mask:

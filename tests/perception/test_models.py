@@ -10,8 +10,9 @@ from PIL import Image
 
 from perception import __main__ as process
 from perception.dataset.dataset import UNLABELLED, Entry, Manifest, read_dataset, write_manifest
-from perception.models.__main__ import judge, main, worse
+from perception.models.__main__ import main
 from perception.models.cards import Card, Data, chosen, read_model, shipped, write_card
+from perception.models.judge import judge_held_out, worse
 from perception.segmentation.frame import CANE, TRUNK
 from perception.segmentation.network_segmenter import NetworkSegmenter
 from rolling_panda.errors import ConfigError, InputError
@@ -50,7 +51,7 @@ def good(tmp_path):
 
 def test_held_out_pictures_are_judged_and_unlabelled_pixels_are_not(tmp_path, good):
     data = read_dataset(Path(dataset(tmp_path / "set", TRUNK)))
-    figures = judge(NetworkSegmenter(good), data)
+    figures = judge_held_out(NetworkSegmenter(good), data)
     assert figures["trunk"]["recall"] == 1.0 and figures["trunk"]["precision"] == 1.0
     assert figures["cane"]["recall"] == 0.0 and figures["cordon"]["recall"] is None
     mask = tmp_path / "set" / "masks" / "b.png"
@@ -58,11 +59,11 @@ def test_held_out_pictures_are_judged_and_unlabelled_pixels_are_not(tmp_path, go
     labels[:, 40:50] = UNLABELLED
     labels[:, 20:24] = TRUNK
     Image.fromarray(labels).save(mask)
-    figures = judge(NetworkSegmenter(good), data)
+    figures = judge_held_out(NetworkSegmenter(good), data)
     assert figures["trunk"]["recall"] == 0.0 and figures["trunk"]["precision"] is None
     write_manifest(tmp_path / "set", Manifest("made up", "own", (Entry("a.png", "train"),)))
     with pytest.raises(InputError, match="--held-out"):
-        judge(NetworkSegmenter(good), read_dataset(tmp_path / "set"))
+        judge_held_out(NetworkSegmenter(good), read_dataset(tmp_path / "set"))
 
 
 def figures(cane, both) -> dict:

@@ -5,6 +5,7 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -134,3 +135,10 @@ def test_an_installed_package_says_that_it_has_no_benchmarks(
 ) -> None:
     monkeypatch.setattr(cli, "find_spec", lambda name: None)
     assert_one_clear_line(capsys, ["bench", "tick"], "checkout")
+
+
+def test_training_says_how_to_get_what_it_needs(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cli, "find_spec", lambda name: None if name == "torch" else find_spec(name))
+    assert_one_clear_line(capsys, ["train", "--help"], "PyTorch", "make training")

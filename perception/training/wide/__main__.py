@@ -5,7 +5,6 @@ interrupted continues where it stopped; with more --steps a finished one goes on
 """
 
 import argparse
-import os
 import sys
 import time
 from collections.abc import Sequence
@@ -18,7 +17,7 @@ from perception.training.scenes import TRAINING_SEED, Scenes, render_scenes
 from perception.training.wide.backgrounds import load_backgrounds
 from perception.training.wide.drawing import Artist
 from perception.training.wide.export import write_network
-from perception.training.wide.fit import Trainer
+from perception.training.wide.fit import Trainer, keep
 from rolling_panda.errors import InputError
 
 _TELL_EVERY, _KEEP_EVERY = 25, 100
@@ -69,16 +68,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     credits = [f"{each.name}: {each.credit}" for each in backgrounds]
     write_network(words.out, trainer, artist, sys.argv[1:] if argv is None else list(argv), credits)
     return 0
-
-
-def keep(trainer: Trainer, path: Path) -> None:
-    """Replace the kept state in one go, so that a kill at any moment leaves a whole one."""
-    new = path.with_suffix(".new")
-    with new.open("wb") as file:
-        torch.save(trainer.state(), file)
-        file.flush()
-        os.fsync(file.fileno())
-    new.replace(path)
 
 
 def _rows(work: Path, count: int) -> Scenes:

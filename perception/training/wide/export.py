@@ -101,22 +101,14 @@ def calibrate(network: PhotographNetwork, drawings: Sequence[Drawing]) -> tuple[
     return float(candidates[int(np.argmin(losses))]), Confusion(counts.reshape(size, size))
 
 
-def write_network(
-    path: Path, trainer: Trainer, artist: Artist, options: Sequence[str], credits: Sequence[str] = ()
-) -> None:
-    """Write the network and its card.
+def write_onnx(path: Path, network: PhotographNetwork, temperature: float) -> None:
+    """Write a trained network.
 
     Args:
-        path: ONNX file; the card is the same name with .md.
-        trainer: The trained network.
-        artist: Draws the held-out pictures.
-        options: Of the command that trained it.
-        credits: Of the real pictures behind the drawn ones: name, author and licence of each.
+        path: ONNX file.
+        network: It is changed.
+        temperature: As of `calibrate`.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    network = trainer.averaged()
-    temperature, confusion = calibrate(network, held_out(artist))
-    parameters = sum(weight.numel() for weight in network.parameters())
     answer, buffer = Answer(network, temperature).eval(), BytesIO()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)
@@ -139,6 +131,25 @@ def write_network(
     onnx.helper.set_model_props(model, properties)
     onnx.checker.check_model(model)
     onnx.save(model, str(path))
+
+
+def write_network(
+    path: Path, trainer: Trainer, artist: Artist, options: Sequence[str], credits: Sequence[str] = ()
+) -> None:
+    """Write the network and its card.
+
+    Args:
+        path: ONNX file; the card is the same name with .md.
+        trainer: The trained network.
+        artist: Draws the held-out pictures.
+        options: Of the command that trained it.
+        credits: Of the real pictures behind the drawn ones: name, author and licence of each.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    network = trainer.averaged()
+    temperature, confusion = calibrate(network, held_out(artist))
+    parameters = sum(weight.numel() for weight in network.parameters())
+    write_onnx(path, network, temperature)
     overlap, found = confusion.overlap(), confusion.found()
     behind = "".join(f"\n  - {each}" for each in credits) or " none"
     table = "\n".join(f"| {name} | {overlap[name]:.3f} | {found[name]:.3f} |" for name in overlap)

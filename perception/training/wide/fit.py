@@ -1,7 +1,10 @@
 """Training loop. Every batch follows from the seed and the number of its step: a run can be resumed anywhere."""
 
+import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 import torch
@@ -144,6 +147,23 @@ class Trainer:
         images = np.stack([network_input(each.color, each.depth) for each in drawings])
         labels = np.stack([each.labels for each in drawings]).astype(np.int64)
         return torch.from_numpy(images).to(memory_format=torch.channels_last), torch.from_numpy(labels)
+
+
+class Resumable(Protocol):
+    """A training that can be saved."""
+
+    def state(self) -> dict[str, object]:
+        """Everything that going on needs."""
+
+
+def keep(trainer: Resumable, path: Path) -> None:
+    """Replace the kept state in one go, so that a kill at any moment leaves a whole one."""
+    new = path.with_suffix(".new")
+    with new.open("wb") as file:
+        torch.save(trainer.state(), file)
+        file.flush()
+        os.fsync(file.fileno())
+    new.replace(path)
 
 
 def weighted_loss(logits: Tensor, labels: Tensor) -> Tensor:
