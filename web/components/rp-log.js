@@ -5,6 +5,7 @@ import { clockWords } from "../js/state/format.js";
 import { log } from "../js/state/page-state.js";
 import { reasonText } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
+import { text } from "../js/state/texts.js";
 import { dropDown, element, setText } from "../js/views/dom.js";
 import { icon } from "../js/views/icons.js";
 import { drawerButton } from "./rp-drawer.js";
@@ -87,7 +88,7 @@ class RpLog extends HTMLElement {
         previous = row;
       }
       empty.hidden = left > 0;
-      setText(empty, lines.length === 0 ? "Nothing has happened yet." : "Nothing in the log is like that.");
+      setText(empty, text(lines.length === 0 ? "log.nothing" : "log.none_like_that"));
       if (following) toEnd();
     };
     for (const control of [least, from, words]) {

@@ -18,6 +18,7 @@ import {
 } from "../js/control/preview.js";
 import { link, now, pageState, points, preview, selected } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
+import { counted, text } from "../js/state/texts.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
 import { reason, reasonText } from "../js/state/reasons.js";
 
@@ -28,16 +29,16 @@ const STEP = 0.05;
 
 class RpPreview extends HTMLElement {
   connectedCallback() {
-    const button = (/** @type {string} */ id, /** @type {string} */ text, /** @type {() => void} */ onclick) =>
-      element("button", { id, text, onclick });
-    const all = button("preview", "Preview", () => void askPreview(""));
-    const one = button("preview-one", "Chosen", () => void askPreview(selected.get()));
-    const run = button("preview-play", "Play", togglePlayback);
-    const close = button("preview-hide", "Hide", hidePreview);
-    const yes = button("approve-preview", "Approve", () => void approvePreview());
+    const button = (/** @type {string} */ id, /** @type {string} */ words, /** @type {() => void} */ onclick) =>
+      element("button", { id, text: words, onclick });
+    const all = button("preview", text("preview.all"), () => void askPreview(""));
+    const one = button("preview-one", text("preview.one"), () => void askPreview(selected.get()));
+    const run = button("preview-play", text("preview.play"), togglePlayback);
+    const close = button("preview-hide", text("preview.hide"), hidePreview);
+    const yes = button("approve-preview", text("preview.approve"), () => void approvePreview());
     const slider = element("input", {
       id: "preview-time",
-      attributes: { type: "range", min: "0", step: String(STEP), "aria-label": "Moment of the preview" },
+      attributes: { type: "range", min: "0", step: String(STEP), "aria-label": text("preview.moment") },
     });
     const time = element("span", { class: "number preview-time" });
     const words = element("p", { class: "preview-words number", attributes: { role: "status" } });
@@ -46,7 +47,7 @@ class RpPreview extends HTMLElement {
       "label",
       { class: "preview-required", attributes: { for: "require-preview" } },
       required,
-      "Before each cut",
+      text("preview.required"),
     );
     const player = element("div", { class: "preview-player" }, run, slider, time, close, yes);
     this.replaceChildren(element("div", { class: "preview-tools" }, all, one, label, words), player);
@@ -73,17 +74,17 @@ class RpPreview extends HTMLElement {
       working = works;
       const accepted = workOrder();
       const chosen = accepted.some((row) => row.point.point_id === selected.get());
-      setEnabled(all, whyNoPreview(accepted.length), "Show what the robot would do with the accepted points");
+      setEnabled(all, whyNoPreview(accepted.length), text("preview.all_hint"));
       setEnabled(
         one,
         whyNoPreview(accepted.length) ?? (chosen ? null : reason("none_chosen")),
-        "Show the cut of the chosen point alone",
+        text("preview.one_hint"),
       );
-      setEnabled(yes, whyNoApproval(), "This is what shall be done; it begins with Start");
-      setText(run, playing.get() ? "Stop" : "Play");
-      setEnabled(close, moment.get() === null ? reason("ghost_hidden") : null, "Take the ghost out of the 3-D view");
+      setEnabled(yes, whyNoApproval(), text("preview.approve_hint"));
+      setText(run, text(playing.get() ? "preview.stop" : "preview.play"));
+      setEnabled(close, moment.get() === null ? reason("ghost_hidden") : null, text("preview.hide_hint"));
       required.checked = state?.required ?? false;
-      setEnabled(required, whyNot("RequirePreview"), "No cut begins before its preview has been approved");
+      setEnabled(required, whyNot("RequirePreview"), text("preview.required_hint"));
       label.title = required.title;
       player.hidden = !hasPreview();
       this.dataset.phase = state?.phase ?? "none";
@@ -105,15 +106,22 @@ class RpPreview extends HTMLElement {
  */
 function wordsOf(state, at) {
   if (state === null || state.phase === "none") return reasonText(state?.reason);
-  if (state.phase === "waiting") return state.reason ? `Waiting: ${reasonText(state.reason)}…` : "Waiting…";
-  if (state.phase === "rolling") return "Working it out…";
-  if (state.phase === "expired") return `Expired: ${reasonText(state.reason)}`;
+  const why = reasonText(state.reason);
+  if (state.phase === "waiting") return why ? text("preview.waiting_for", { why }) : text("preview.waiting");
+  if (state.phase === "rolling") return text("preview.rolling");
+  if (state.phase === "expired") return text("preview.expired", { why });
   const cut = at === null ? undefined : cutAt(at);
-  const approved = state.phase === "approved" ? `Approved by ${state.approved_by}. ` : "";
-  if (cut) return `${approved}${cut.point_id}: ${cut.reason ? `not cut: ${reasonText(cut.reason)}` : "cut"} · ${least([cut])}`;
-  const left = state.remaining > 0 ? ` of ${state.cuts.length + state.remaining}` : "";
+  const approved = state.phase === "approved" ? `${text("preview.approved", { user: state.approved_by })} ` : "";
+  if (cut) {
+    const end = cut.reason ? text("preview.not_cut", { why: reasonText(cut.reason) }) : text("preview.cut");
+    return `${approved}${cut.point_id}: ${end} · ${least([cut])}`;
+  }
+  const seconds = state.duration_s.toFixed(1);
   const done = state.cuts.filter((each) => each.cut_s !== null).length;
-  return `${approved}${done}${left} ${done === 1 ? "cut" : "cuts"} in ${state.duration_s.toFixed(1)} s · ${least(state.cuts)}`;
+  const all = state.cuts.length + state.remaining;
+  const cuts =
+    state.remaining > 0 ? counted("preview.some_cuts", done, { all, seconds }) : counted("preview.cuts", done, { seconds });
+  return `${approved}${cuts} · ${least(state.cuts)}`;
 }
 
 /** @param {readonly import("../js/link/messages.js").PreviewedCut[]} cuts */
@@ -124,6 +132,11 @@ function least(cuts) {
   );
   const omega = Math.min(...cuts.map((cut) => cut.manipulability));
   const margin = Math.min(...cuts.map((cut) => cut.joint_margin));
-  return `least ${Math.round(1000 * nearest.clearance)} mm ${nearest.between.join("–")} · ω ${omega.toFixed(3)} · joints ${((180 / Math.PI) * margin).toFixed(0)}°`;
+  return text("preview.least", {
+    clearance: Math.round(1000 * nearest.clearance),
+    between: nearest.between.join("–"),
+    omega: omega.toFixed(3),
+    margin: ((180 / Math.PI) * margin).toFixed(0),
+  });
 }
 customElements.define("rp-preview", RpPreview);

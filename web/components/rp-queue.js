@@ -53,11 +53,11 @@ class RpQueue extends HTMLElement {
   connectedCallback() {
     const source = element("span", {
       class: "tag",
-      attributes: { title: "What tells cane, node and post apart in the image" },
+      attributes: { title: text("queue.source") },
     });
-    const { head, note } = panelHead("Pruning points", source, undoButton());
+    const { head, note } = panelHead(text("queue.title"), source, undoButton());
     const summary = element("p", { class: "summary number" });
-    const list = element("div", { class: "groups", attributes: { role: "group", "aria-label": "Pruning points" } });
+    const list = element("div", { class: "groups", attributes: { role: "group", "aria-label": text("queue.title") } });
     const empty = element("div", { class: "empty", attributes: { role: "status" } });
     const open = [
       undecidedList("another look", (count) => counted("queue.look", count)),
@@ -304,7 +304,7 @@ function inOrder(rows) {
 
 /** @param {PagePoint} row */
 function groupOf(row) {
-  return `Vine ${row.point.vine} · spur ${row.point.spur}`;
+  return text("queue.group", { vine: row.point.vine, spur: row.point.spur });
 }
 
 /** @param {readonly PagePoint[]} rows */
@@ -312,9 +312,14 @@ function summaryWords(rows) {
   if (rows.length === 0) return "";
   const notCut = countOf("FAILED_NOT_CUT");
   const beyond = countOf("UNREACHABLE");
-  const reach = beyond > 0 ? ` · ${beyond} cannot be reached` : "";
-  const more = notCut > 0 ? ` · ${notCut} not cut` : "";
-  return `${rows.length} found · ${countOf("ACCEPTED")} accepted${reach} · ${countOf("DONE")} done${more}`;
+  const words = [
+    text("queue.found", { count: rows.length }),
+    text("queue.accepted", { count: countOf("ACCEPTED") }),
+    beyond > 0 ? text("queue.beyond", { count: beyond }) : "",
+    text("queue.done", { count: countOf("DONE") }),
+    notCut > 0 ? text("queue.not_cut", { count: notCut }) : "",
+  ];
+  return words.filter(Boolean).join(" · ");
 }
 
 function emptyWords() {

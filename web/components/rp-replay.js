@@ -3,13 +3,14 @@
 import { ask } from "../js/link/api.js";
 import { pageState, points } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
+import { text } from "../js/state/texts.js";
 import { element, setText } from "../js/views/dom.js";
 
 class RpReplay extends HTMLElement {
   toggle = element("button", { id: "replay-toggle" });
   slider = element("input", {
     id: "replay-position",
-    attributes: { type: "range", min: "0", step: "0.1", value: "0", "aria-label": "Position in the recording" },
+    attributes: { type: "range", min: "0", step: "0.1", value: "0", "aria-label": text("replay.position") },
   });
   time = element("span", { class: "number", attributes: { role: "status" } });
   words = element("strong");
@@ -19,8 +20,8 @@ class RpReplay extends HTMLElement {
 
   connectedCallback() {
     this.setAttribute("role", "group");
-    this.setAttribute("aria-label", "Recording");
-    const who = element("details", {}, element("summary", { text: "Who accepted which" }), this.list);
+    this.setAttribute("aria-label", text("replay.label"));
+    const who = element("details", {}, element("summary", { text: text("replay.who") }), this.list);
     this.append(this.words, this.toggle, this.slider, this.time, who);
     this.toggle.addEventListener("click", () => {
       const replay = pageState.get()?.replay;
@@ -41,15 +42,15 @@ class RpReplay extends HTMLElement {
 
   /** @param {{ playing: boolean, position_s?: number }} request */
   seek(request) {
-    void ask("Moving in the recording", "api/replay", request);
+    void ask(text("replay.seek"), "api/replay", request);
   }
 
   draw() {
     const replay = pageState.get()?.replay ?? null;
     this.hidden = replay === null;
     if (replay === null) return;
-    setText(this.words, `Recording ${replay.name}: nothing here moves a robot`);
-    setText(this.toggle, replay.playing ? "Pause" : "Play");
+    setText(this.words, text("replay.name", { name: replay.name }));
+    setText(this.toggle, text(replay.playing ? "replay.pause" : "replay.play"));
     this.slider.max = String(replay.duration_s);
     if (!this.dragged) this.slider.value = String(replay.position_s);
     const at = new Date(1000 * (replay.begins_at + replay.position_s));

@@ -16,6 +16,7 @@ import { nearWords } from "../js/state/format.js";
 import { link, now, pageState, showToast } from "../js/state/page-state.js";
 import { reasonText } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
+import { text } from "../js/state/texts.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
 import { holdButton } from "../js/views/hold-button.js";
 import { icon } from "../js/views/icons.js";
@@ -177,7 +178,7 @@ class RpTeleoperation extends HTMLElement {
     speed.addEventListener("input", () => hold.speedScale.set(Number(speed.value) / 100));
     const pace = element("label", { class: "pace" }, "Speed", speed, percent);
 
-    const holdWords = element("span", { text: "Hold to move" });
+    const holdWords = element("span", { text: text("teleop.hold") });
     const button = element(
       "button",
       { id: "hold", attributes: { "aria-keyshortcuts": "H" } },
@@ -200,9 +201,9 @@ class RpTeleoperation extends HTMLElement {
       const why = whyNoTeleoperation();
       const holding = hold.holding.get();
       const part = moving.get();
-      setEnabled(toggle, why, on ? "Hide the gizmo" : "Show the gizmo at the tool");
+      setEnabled(toggle, why, text(on ? "teleop.hide" : "teleop.show"));
       toggle.setAttribute("aria-pressed", String(on));
-      setEnabled(button, hold.whyNot(), "The tool follows the gizmo while you hold");
+      setEnabled(button, hold.whyNot(), text("teleop.hold_hint"));
       button.classList.toggle("held", holding);
       this.classList.toggle("on", on);
       what.hidden = pace.hidden = !on;
@@ -211,13 +212,13 @@ class RpTeleoperation extends HTMLElement {
       words.hidden = !on;
       pad.hidden = !on || part !== "base";
       joints.hidden = !on || part !== "joints";
-      setText(holdWords, holding ? "Moving…" : "Hold to move");
+      setText(holdWords, text(holding ? "teleop.moving" : "teleop.hold"));
       setText(percent, `${Math.round(100 * hold.speedScale.get())} %`);
       const controller = pageState.get()?.controller ?? null;
       const held = (holding && controller?.limited_by) || "";
       setText(
         words,
-        held ? `Held back by ${held}.` : explanation(why, holding, part, nearWords(controller)),
+        held ? text("teleop.held_back", { by: held }) : explanation(why, holding, part, nearWords(controller)),
       );
       words.classList.toggle("warned", held !== "" || (controller?.proximity?.distance ?? 1) < NEAR);
     });
@@ -234,8 +235,8 @@ class RpTeleoperation extends HTMLElement {
  * @param {readonly (readonly [T, string, string])[]} values Each with its label and title.
  */
 function choice(label, chosen, choose, values) {
-  const buttons = values.map(([value, text, title]) => {
-    const button = element("button", { text, data: { choice: value }, attributes: { title } });
+  const buttons = values.map(([value, words, title]) => {
+    const button = element("button", { text: words, data: { choice: value }, attributes: { title } });
     button.addEventListener("click", () => choose(value));
     drawOn([chosen], () => button.setAttribute("aria-pressed", String(chosen.get() === value)));
     return button;
@@ -251,9 +252,7 @@ function choice(label, chosen, choose, values) {
  */
 function explanation(why, holding, part, near) {
   if (why) return `${reasonText(why)}.`;
-  if (holding) return near || (part === "tool" ? "The tool follows the gizmo. Let go to stop." : "Let go to stop.");
-  if (part === "base") return "The base moves while you hold, and stops when you let go.";
-  if (part === "joints") return "A joint turns while you hold + or −. The bar is its range.";
-  return "Drag the gizmo: the tool follows while you drag, or while you hold the button or H. Let go and it stops.";
+  if (holding) return near || text(part === "tool" ? "teleop.tool_moves" : "teleop.moves");
+  return text(`teleop.how.${part}`);
 }
 customElements.define("rp-teleoperation", RpTeleoperation);

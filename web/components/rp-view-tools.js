@@ -15,6 +15,7 @@ import {
 import { link, now, pageState } from "../js/state/page-state.js";
 import { reason } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
+import { text } from "../js/state/texts.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
 
 class RpPlacing extends HTMLElement {
@@ -105,11 +106,17 @@ function whyNoMeasuring() {
 
 function distanceWords() {
   const told = measured.get();
-  if (told === null) return "Click two places in the view.";
+  if (told === null) return text("measure.click");
   const [along, across, up] = told.offset;
   const far = Math.hypot(along, across, up);
-  const parts = `${metres(along)} along, ${metres(across)} across, ${metres(up)} up`;
-  return `${metres(far)} m from ${told.between[0]} to ${told.between[1]}: ${parts}`;
+  return text("measure.told", {
+    far: metres(far),
+    from: told.between[0],
+    to: told.between[1],
+    along: metres(along),
+    across: metres(across),
+    up: metres(up),
+  });
 }
 
 /** @param {number} value */

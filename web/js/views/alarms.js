@@ -53,7 +53,7 @@ function alarm(why, steps = []) {
 
 /** @param {PageState} state */
 function ofRobot(state) {
-  return [...ofProcesses(), ...ofMode(state), ...ofDevices(state), ...ofSettings(state), ...ofWork(), ...ofReadings(state)];
+  return [...ofProcesses(), ...ofDevices(state), ...ofMode(state), ...ofSettings(state), ...ofWork(), ...ofReadings(state)];
 }
 
 /** A silent server says nothing about the others. */

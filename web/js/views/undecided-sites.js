@@ -5,11 +5,10 @@ import { ask } from "../link/api.js";
 import { link, now, pageState } from "../state/page-state.js";
 import { reasonText } from "../state/reasons.js";
 import { drawOn } from "../state/signals.js";
+import { text } from "../state/texts.js";
 import { element, setEnabled, setText } from "./dom.js";
 
 /** @typedef {import("../link/messages.js").UndecidedSite} UndecidedSite */
-
-const HINT = "Drive there and look at it from both its sides; nothing is cut";
 
 /**
  * The undecided sites that need one thing.
@@ -25,7 +24,7 @@ export function undecidedList(needs, title) {
     const buttons = /** @type {NodeListOf<HTMLButtonElement>} */ (list.querySelectorAll("button.look-again"));
     if (buttons.length === 0) return;
     const why = whyNot("Survey");
-    for (const button of buttons) setEnabled(button, why, HINT);
+    for (const button of buttons) setEnabled(button, why, text("sites.look_hint"));
   });
   let shown = "";
   return {
@@ -47,7 +46,7 @@ export function undecidedList(needs, title) {
 /** @param {UndecidedSite} site */
 function siteWords(site) {
   const why = reasonText(site.reason);
-  return site.vine === 0 ? why : `Vine ${site.vine} · spur ${site.spur}: ${why}`;
+  return site.vine === 0 ? why : text("sites.place", { vine: site.vine, spur: site.spur, why });
 }
 
 /**
@@ -57,10 +56,10 @@ function siteWords(site) {
 function siteItem(site) {
   const item = element("li", {}, element("span", { text: siteWords(site) }));
   if (site.needs !== "another look" || site.position === null) return item;
-  const button = element("button", { class: "quiet look-again", text: "Look again" });
+  const button = element("button", { class: "quiet look-again", text: text("sites.look") });
   const { vine, spur } = site;
-  button.addEventListener("click", () => void ask("Look again", "api/look-again", { vine, spur }));
-  setEnabled(button, whyNot("Survey"), HINT);
+  button.addEventListener("click", () => void ask(text("sites.look"), "api/look-again", { vine, spur }));
+  setEnabled(button, whyNot("Survey"), text("sites.look_hint"));
   item.append(button);
   return item;
 }
