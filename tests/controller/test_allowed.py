@@ -10,6 +10,7 @@ from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.commands import COMMAND_OF, INTENTS, POINT_STATES
 from rolling_panda.messages.supervision import PreviewState
+from tests.controller.test_command_table import example as any_of
 from tests.support.controller_at_work import CONFIG, robot
 from tests.support.points import point
 from tests.support.sent import every, newest
@@ -17,7 +18,7 @@ from tests.support.sent import every, newest
 RULES = (m.PruningRule(), m.PruningRule(nodes_kept=1))
 POINTS = (point("a", (0.45, 0.75, 1.05)), point("b", (0.75, 0.75, 1.1), confidence=0.5))
 THICK = point("c", (1.0, 0.75, 1.0), radius=0.9 * CONFIG.work.largest_radius + 0.01)
-#: Beside the points that perception may show: those that are told apart by nothing but the rule.
+#: What perception may show: points, and the number of the rule.
 VIEWS = {
     "no points": ((), 0),
     "points": (POINTS, 0),
@@ -26,11 +27,6 @@ VIEWS = {
 }
 SITE = m.UndecidedSite(vine=1, spur=2, reason=reasons.said("test"), needs="another look", position=(0.4, 0.8, 1.0))
 COMMANDS = tuple(kind for kind in INTENTS if COMMAND_OF[kind].tag != "control")
-#: A value of each field, for a command that is refused whatever it says.
-ANY = {
-    "point_id": "a", "revision": 1, "vine": 1, "spur": 2, "reason": "-", "outcome": "DONE", "preview_hash": "0f",
-    "required": True, "rule": RULES[1],
-}  # fmt: skip
 
 
 class World:
@@ -144,9 +140,8 @@ class World:
 
 
 def example(kind):
-    """A command of a kind with some argument."""
-    needed = (each.name for each in msgspec.structs.fields(kind) if each.required and each.name != "user")
-    return kind(user="ada", role="supervisor", **{name: ANY[name] for name in needed})
+    """A command of a kind with some arguments."""
+    return msgspec.structs.replace(any_of(kind), role="supervisor")
 
 
 EVENTS = (*VIEWS, "stop", "silent bridge", "watchdog", "closing", "server", "perception", "unknown cut", 0.2, 1.2, 16.0)
