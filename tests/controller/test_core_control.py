@@ -40,9 +40,12 @@ def test_somebody_else_neither_starts_nor_moves_what_another_holds():
     for intent in (intents.Start(user="bob"), intents.Home(user="bob")):
         assert r.ask(intent).reason == reasons.control_held("ada")
     assert r.ask(intents.AcceptAll(user="bob")).ok
+    # A hold that begins with a change of mode would count for nothing at all.
+    r.step()
     r.teleop = TeleopTarget(sequence=1, hold=True, user="bob", base=BaseVelocity(0.2, 0.0))
     r.run(0.5)
     assert r.state.mode == "READY" and np.abs(r.xi).max() < 1e-6
+    assert text_of(reasons.teleoperation_refused(reasons.control_held("ada"))) in r.events
     # Anybody who may operate may pause.
     assert r.ask(intents.Start(user="ada")).ok
     assert r.ask(intents.Pause(user="bob")).ok

@@ -16,7 +16,9 @@ def held():
 
 
 def test_who_comes_first_holds_control():
+    assert Lease().notice is None
     it = held()
+    assert it.notice == reasons.control_given("Ada")
     assert it.held_by(ADA) and not it.held_by(BOB)
     it.claim(BOB, 0.1)
     assert it.held_by(ADA)

@@ -2,6 +2,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from rolling_panda import reasons
 from rolling_panda.errors import InputError
 from server.auth.sessions import Sessions, SignInError
 
@@ -43,7 +44,8 @@ def test_bad_attempts_cost_more_and_more_time_and_a_good_one_ends_that():
     assert caught.value.wait_s == 0.0
     with pytest.raises(SignInError) as caught:
         sessions.sign_in("wrong", 0.5)
-    assert caught.value.reason.code == "sign_in_throttled"
+    # Nobody is told to wait for less than a second.
+    assert caught.value.reason == reasons.sign_in_throttled(1.0)
     assert caught.value.wait_s == pytest.approx(0.5)
     with pytest.raises(SignInError):
         sessions.sign_in("wrong", 1.0)
