@@ -23,6 +23,7 @@ FORWARDED = {
     "server": ("server", "the operator's page and its REST interface"),
     "record": ("recorder.record", "write down all that is on the robot's wire, for Foxglove and for `replay`"),
     "replay": ("recorder.replay", "a recording on the operator's page, with a scrubber; nothing moves"),
+    "frames": ("recorder.frames", "camera pictures of a recording, to label them"),
     "audit": ("controller.ledger.audit", "what was decided, refused and done: check the record or write it out"),
     "user": ("server.auth.user_command", "who may sign in with a password"),
     "certificates": (

@@ -64,6 +64,8 @@ def test_a_killed_training_ends_as_one_that_was_not(vineyard, tmp_path):
     torch.save(first.state(), tmp_path / "state.pt")
     second.restore(torch.load(tmp_path / "state.pt", weights_only=True), tmp_path / "state.pt")
     assert begun + [second.train_step() for _ in range(2)] == pytest.approx(told, rel=1e-4)
+    for name, value in whole.state()["network"].items():
+        torch.testing.assert_close(second.state()["network"][name], value, rtol=1e-3, atol=1e-5)
     assert [each.f for each in second.curve] == [each.f for each in first.curve] and second.step == 4
     with pytest.raises(InputError, match="--work"):
         second.restore({"mark": "other"}, tmp_path / "state.pt")
