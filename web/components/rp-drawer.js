@@ -1,6 +1,7 @@
 // The drawer over the 3-D view, with the charts or the report. Queue, log and stop stay in view.
 
 import { drawOn, signal } from "../js/state/signals.js";
+import { text } from "../js/state/texts.js";
 import { element, setText } from "../js/views/dom.js";
 
 /** @typedef {"charts"|"report"} SheetName */
@@ -56,7 +57,7 @@ class RpDrawer extends HTMLElement {
     const close = element("button", {
       id: "close-drawer",
       class: "quiet",
-      text: "Close",
+      text: text("drawer.close"),
       onclick: () => drawer.set(""),
     });
     this.append(element("div", { class: "panel-head" }, this.heading, this.tools, close), this.waiting);
@@ -77,13 +78,13 @@ class RpDrawer extends HTMLElement {
     if (!wasHidden && !name && this.opener instanceof HTMLElement) this.opener.focus();
     const load = SHEETS[name];
     if (!load) return;
-    setText(this.waiting, "Loading…");
+    setText(this.waiting, text("drawer.loading"));
     try {
       const sheet = this.sheets.get(name) ?? (await load());
       if (!this.sheets.has(name)) this.append(sheet);
       this.sheets.set(name, sheet);
     } catch {
-      setText(this.waiting, "This could not be loaded. Close it, and open it again when the server is there.");
+      setText(this.waiting, text("drawer.failed"));
     }
     // Another sheet may have been opened meanwhile.
     if (drawer.get() === name) this.lay(name);

@@ -4,6 +4,7 @@ import { cutTime, moveTo, orderWords, resetOrder, whyNoMove, whyNoResetOrder, wo
 import { select, selectAndReveal } from "../js/control/selection.js";
 import { link, now, pageState, points, revealCount, selected } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
+import { text } from "../js/state/texts.js";
 import { element, setAttribute, setEnabled, setText } from "../js/views/dom.js";
 import { reasonText } from "../js/state/reasons.js";
 
@@ -16,7 +17,6 @@ const SPARE = 4;
 /** A drag within EDGE of an end scrolls the list by SCROLL for each move (px). */
 const EDGE = 30;
 const SCROLL = 8;
-const HINT = "Arrows choose; Alt and an arrow move the chosen point, Alt and Home or End to the first or last place";
 
 /**
  * Keys that move the selection, or with Alt the selected row: (index, last index) → index.
@@ -44,7 +44,7 @@ class RpOrder extends HTMLElement {
     const back = element("button", {
       id: "planners-order",
       class: "quiet",
-      text: "Plan's order",
+      text: text("order.reset"),
       onclick: () => void resetOrder(),
     });
     this.space = element("div", { class: "order-space" });
@@ -57,9 +57,9 @@ class RpOrder extends HTMLElement {
         attributes: {
           role: "listbox",
           tabindex: "0",
-          "aria-label": "Order of work",
-          "aria-description": HINT,
-          title: HINT,
+          "aria-label": text("order.label"),
+          "aria-description": text("order.hint"),
+          title: text("order.hint"),
         },
       },
       this.space,
@@ -74,7 +74,7 @@ class RpOrder extends HTMLElement {
         "div",
         { class: "order-body" },
         this.list,
-        element("div", { class: "order-foot" }, element("span", { text: "Drag a row, or Alt + arrows" }), back),
+        element("div", { class: "order-foot" }, element("span", { text: text("order.drag") }), back),
       ),
       this.said,
     );
@@ -90,7 +90,7 @@ class RpOrder extends HTMLElement {
     drawOn([selected, revealCount], () => this.reveal(this.place(selected.get())));
     drawOn([points, pageState, link, now, selected], () => {
       setText(words, orderWords());
-      setEnabled(back, whyNoResetOrder(), "Work in the order that the plan finds the quickest");
+      setEnabled(back, whyNoResetOrder(), text("order.reset_hint"));
       this.order = workOrder();
       this.draw();
     });
@@ -134,7 +134,7 @@ class RpOrder extends HTMLElement {
     const [, number, name, way] = row.children;
     const why = reasonText(point.entry.reason);
     if (number) setText(number, `${at + 1}`);
-    if (name) setText(name, `${point.point.point_id} · vine ${point.point.vine}, spur ${point.point.spur}`);
+    if (name) setText(name, text("order.row", { point: point.point.point_id, vine: point.point.vine, spur: point.point.spur }));
     if (way) setText(way, point.plan ? cutTime(point.plan) : "");
     setAttribute(row, "data-point-id", point.point.point_id);
     setAttribute(row, "title", why || reasonText(point.point.reason));
@@ -182,7 +182,7 @@ class RpOrder extends HTMLElement {
    * @param {number} to
    */
   async move(pointId, to) {
-    if ((await moveTo(pointId, to)) && this.said) setText(this.said, `${pointId} is number ${to + 1} now`);
+    if ((await moveTo(pointId, to)) && this.said) setText(this.said, text("order.moved", { point: pointId, number: to + 1 }));
   }
 
   /** @param {PointerEvent} event */

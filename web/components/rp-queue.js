@@ -251,15 +251,15 @@ class RpQueue extends HTMLElement {
 /** A placeholder until the order is fetched, so that the first acceptance shifts no row. */
 function orderOfWork() {
   const order = document.createElement("rp-order");
-  order.append(element("p", { class: "rule order-none", text: "Order of work: nothing accepted" }));
+  order.append(element("p", { class: "rule order-none", text: text("order.none_accepted") }));
   return order;
 }
 
 function undoButton() {
-  const button = element("button", { id: "undo", class: "quiet", text: "Undo" });
+  const button = element("button", { id: "undo", class: "quiet", text: text("queue.undo") });
   button.addEventListener("click", () => void undo());
   drawOn([decisions, pageState, link, now], () => {
-    setEnabled(button, whyNoUndo(), `Take back: ${decisions.get().at(-1)?.words ?? ""} (Z)`);
+    setEnabled(button, whyNoUndo(), text("queue.undo_hint", { words: decisions.get().at(-1)?.words ?? "" }));
   });
   return button;
 }
@@ -270,15 +270,12 @@ function acceptEvery() {
   drawOn([points, pageState, link, now], () => {
     const sure = confidentPoints().length;
     const unsure = countOf("PROPOSED") - sure;
-    const words = `≥ ${Math.round(100 * SURE)} % sure`;
-    setText(button, `Accept all ${sure} (${words})`);
+    const percent = Math.round(100 * SURE);
+    setText(button, text("queue.accept_all", { sure, percent }));
     const none = unsure === 0 ? reason("none_proposed") : reason("none_so_confident", { confidence: SURE });
-    const rest = unsure === 0 ? "" : `; ${unsure} less sure: decide one by one`;
-    setEnabled(
-      button,
-      whyNot("AcceptAll") ?? (sure === 0 ? none : null),
-      `Accept every proposed point that is ${words}${rest}`,
-    );
+    const hint =
+      unsure === 0 ? text("queue.accept_all_hint", { percent }) : text("queue.accept_sure_hint", { percent, unsure });
+    setEnabled(button, whyNot("AcceptAll") ?? (sure === 0 ? none : null), hint);
   });
   return button;
 }
@@ -286,12 +283,12 @@ function acceptEvery() {
 function addByHand() {
   const button = element(
     "button",
-    { id: "add-by-hand", attributes: { "aria-label": "Add a point by hand" } },
+    { id: "add-by-hand", attributes: { "aria-label": text("queue.add") } },
     icon("add"),
   );
   button.addEventListener("click", () => setPlacing(!placing.get()));
   drawOn([placing, pageState, link, now], () => {
-    setEnabled(button, whyNoPlacing(), "Add a point by hand: click a cane in the 3-D view or in the camera image");
+    setEnabled(button, whyNoPlacing(), text("queue.add_hint"));
     button.setAttribute("aria-pressed", String(placing.get()));
   });
   return button;

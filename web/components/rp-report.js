@@ -2,7 +2,7 @@
 
 import { clockWords } from "../js/state/format.js";
 import { reasonText } from "../js/state/reasons.js";
-import { labelOf, text } from "../js/state/texts.js";
+import { counted, labelOf, text } from "../js/state/texts.js";
 import { element, setText } from "../js/views/dom.js";
 
 /** @typedef {import("../js/link/messages.js").SessionReport} SessionReport */
@@ -46,9 +46,9 @@ export class RpReport extends HTMLElement {
       const response = await fetch("api/report", { credentials: "same-origin", signal: AbortSignal.timeout(4000) });
       const body = await response.json();
       if (response.ok) this.show(body);
-      else setText(this.words, `${body.reason} What is below stays as it was.`);
+      else setText(this.words, text("report.old", { why: body.reason }));
     } catch {
-      setText(this.words, "The server cannot be reached; what is below is the last that was heard.");
+      setText(this.words, text("report.unreachable"));
     }
   }
 
@@ -56,9 +56,11 @@ export class RpReport extends HTMLElement {
   show(report) {
     const ended = report.cuts.filter((cut) => cut.ended_at > 0);
     const seconds = ended.reduce((sum, cut) => sum + cut.seconds, 0);
-    const since = report.began_at > 0 ? `since ${clockWords(report.began_at)}` : "nothing recorded yet";
+    const since =
+      report.began_at > 0 ? text("report.since", { time: clockWords(report.began_at) }) : text("report.nothing");
     const left = report.cut_count - report.cuts.length;
-    setText(this.words, `From the ledger, ${since}${left > 0 ? `; ${left} older cuts are in the ledger alone` : ""}.`);
+    const older = left > 0 ? [counted("report.older", left)] : [];
+    setText(this.words, [since, ...older].join(" "));
     const count = (/** @type {"done"|"not_cut"|"unknown"|"unreachable"} */ name) =>
       report.vines.reduce((sum, vine) => sum + vine[name], 0);
     sums(this.sums, [

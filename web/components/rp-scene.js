@@ -6,6 +6,7 @@ import { listenForSpace } from "../js/control/stop.js";
 import { listenForDrag, listenForHoldKey } from "../js/control/teleoperation.js";
 import { listenForViewKeys } from "../js/control/view-tools.js";
 import { link } from "../js/state/page-state.js";
+import { text } from "../js/state/texts.js";
 import { element } from "../js/views/dom.js";
 
 /** Below this width (px) the 3-D client puts its own panel over the view. */
@@ -15,26 +16,26 @@ const LOAD_TIMEOUT_MS = 20_000;
 
 class RpScene extends HTMLElement {
   connectedCallback() {
-    const words = element("p", { text: "Loading the 3-D view…" });
-    const retry = element("button", { text: "Load it again" });
+    const words = element("p", { text: text("scene.loading") });
+    const retry = element("button", { text: text("scene.again") });
     retry.hidden = true;
-    const frame = element("iframe", { attributes: { title: "3-D view of the robot and the row", tabindex: "0" } });
+    const frame = element("iframe", { attributes: { title: text("scene.label"), tabindex: "0" } });
     const waiting = element("div", { class: "empty", attributes: { role: "status" } }, words, retry);
     this.append(waiting, frame);
 
     let timeout = 0;
-    /** @param {string} text */
-    const fail = (text) => {
-      words.textContent = text;
+    /** @param {string} why */
+    const fail = (why) => {
+      words.textContent = why;
       retry.hidden = false;
     };
     const load = () => {
-      words.textContent = "Loading the 3-D view…";
+      words.textContent = text("scene.loading");
       retry.hidden = true;
       waiting.hidden = false;
       window.clearTimeout(timeout);
       timeout = window.setTimeout(
-        () => fail("The 3-D view shows nothing yet; this browser may lack WebGL. Everything else works without it."),
+        () => fail(text("scene.late")),
         LOAD_TIMEOUT_MS,
       );
       frame.classList.remove("loaded");
@@ -46,7 +47,7 @@ class RpScene extends HTMLElement {
       const there = frame.contentDocument?.querySelector("#root, canvas") ?? null;
       if (there === null) {
         window.clearTimeout(timeout);
-        fail("The 3-D view did not load. Everything else works without it.");
+        fail(text("scene.failed"));
         return;
       }
       listenForSpace(view);

@@ -20,11 +20,11 @@ import { element, setEnabled, setText } from "../js/views/dom.js";
 
 class RpPlacing extends HTMLElement {
   connectedCallback() {
-    const done = element("button", { id: "placing-done", text: "Done", attributes: { "aria-keyshortcuts": "Escape" } });
+    const done = element("button", { id: "placing-done", text: text("placing.done"), attributes: { "aria-keyshortcuts": "Escape" } });
     done.addEventListener("click", () => setPlacing(false));
     this.append(
       element("p", {
-        text: "Click a cane that has been seen: a blue line here, or a cane in the camera image.",
+        text: text("placing.how"),
         attributes: { role: "status" },
       }),
       done,
@@ -47,15 +47,15 @@ class RpViewTools extends HTMLElement {
       drawOn([link, pageState], () => setEnabled(button, whyNoLooking(), `${hint} (key ${key})`));
       return button;
     });
-    const measure = element("button", { id: "measure", text: "Measure", attributes: { "aria-keyshortcuts": "M" } });
+    const measure = element("button", { id: "measure", text: text("measure.begin"), attributes: { "aria-keyshortcuts": "M" } });
     measure.addEventListener("click", () => setMeasuring(!measuring.get()));
 
     const list = element("div", { id: "layers", class: "layers" });
     list.hidden = true;
     const open = element("button", {
       id: "show-layers",
-      text: "Layers",
-      attributes: { "aria-expanded": "false", "aria-controls": "layers", title: "What the view shows" },
+      text: text("layers.title"),
+      attributes: { "aria-expanded": "false", "aria-controls": "layers", title: text("layers.hint") },
     });
     const show = (/** @type {boolean} */ shown) => {
       list.hidden = !shown;
@@ -87,7 +87,7 @@ class RpViewTools extends HTMLElement {
     drawOn([measuring, measured, placing, link, pageState, now], () => {
       const on = measuring.get();
       this.hidden = placing.get();
-      setEnabled(measure, whyNoMeasuring(), on ? "Measure no more" : "Click two places for their distance (key M)");
+      setEnabled(measure, whyNoMeasuring(), text(on ? "measure.end_hint" : "measure.hint"));
       measure.setAttribute("aria-pressed", String(on));
       words.hidden = !on;
       setText(words, distanceWords());

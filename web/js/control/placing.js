@@ -4,6 +4,7 @@ import { post } from "../link/api.js";
 import { socket } from "../link/socket.js";
 import { link, pageState, say, showToast } from "../state/page-state.js";
 import { signal } from "../state/signals.js";
+import { text } from "../state/texts.js";
 import { whyNothingOf } from "./allowed.js";
 import { select } from "./selection.js";
 
@@ -37,7 +38,7 @@ export async function placePoint(path, body) {
     showToast("info", answer.reason);
     return point;
   }
-  const words = `No point placed: ${answer.reason}`;
+  const words = text("placing.refused", { why: answer.reason });
   if (answer.status === 409) showToast("warning", words);
   else say("error", words);
   return "";
