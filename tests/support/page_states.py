@@ -21,6 +21,7 @@ from rolling_panda.messages.supervision import (
     VineReport,
 )
 from rolling_panda.reasons import said, text_of
+from server.api.responses import outcome
 from tests.support.page_parts import accepted, choose, held, planned, queue, ready, show, show_mode, working
 from tests.support.played_server import PlayedServer, bridge, controller, point
 from tests.support.points import rolled_out
@@ -97,8 +98,7 @@ def _rule(page: Page, server: PlayedServer) -> None:
     working(page, server)
     server.rule = m.PruningRule(system="guyot")
     server.tell(server.page_points())
-    said = "17 move, 3 go, 5 come, 4 acceptances would be void"
-    server.answers["/api/rule/what-if"] = (200, {"ok": True, "reason": said})
+    server.answers["/api/rule/what-if"] = (200, outcome(True, reasons.rule_effect(17, 3, 5, 4)))
     page.locator("rp-rule summary").click()
     expect(page.locator("rp-rule input").first).to_be_visible()
     if server.role != "viewer":
