@@ -38,8 +38,11 @@ def test_the_list_is_in_the_order_of_work_and_says_whose_it_is(page: Page, serve
     opened(page)
     assert shown(page) == ["p1", "p2", "p3", "p4", "p5"]
     back = page.locator("#planners-order")
+    whose = {"ResetOrder": reasons.order_of_plan()}
+    server.controller = msgspec.structs.replace(server.controller, allowed=server.controller.allowed | whose)
     expect(back).to_have_attribute("title", text_of(reasons.order_of_plan()))
-    server.controller = msgspec.structs.replace(server.controller, order=m.QueueOrder(8, "Bob"))
+    allowed = server.controller.allowed | {"ResetOrder": None}
+    server.controller = msgspec.structs.replace(server.controller, order=m.QueueOrder(8, "Bob"), allowed=allowed)
     expect(page.locator("rp-order summary")).to_contain_text("by Bob")
     back.click()
     until(page, lambda: ("/api/order/planners", {"revision": 8}) in server.posted)

@@ -72,12 +72,11 @@ class RpPreview extends HTMLElement {
       const works = pageState.get()?.controller?.mode === "AUTO";
       if (works && !working) hidePreview();
       working = works;
-      const accepted = workOrder();
-      const chosen = accepted.some((row) => row.point.point_id === selected.get());
-      setEnabled(all, whyNoPreview(accepted.length), text("preview.all_hint"));
+      const chosen = workOrder().some((row) => row.point.point_id === selected.get());
+      setEnabled(all, whyNoPreview(), text("preview.all_hint"));
       setEnabled(
         one,
-        whyNoPreview(accepted.length) ?? (chosen ? null : reason("none_chosen")),
+        whyNoPreview() ?? (chosen ? null : reason("none_chosen")),
         text("preview.one_hint"),
       );
       setEnabled(yes, whyNoApproval(), text("preview.approve_hint"));

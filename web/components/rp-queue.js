@@ -272,7 +272,7 @@ function acceptEvery() {
     const unsure = countOf("PROPOSED") - sure;
     const percent = Math.round(100 * SURE);
     setText(button, text("queue.accept_all", { sure, percent }));
-    const none = unsure === 0 ? reason("none_proposed") : reason("none_so_confident", { confidence: SURE });
+    const none = reason("none_so_confident", { confidence: SURE });
     const hint =
       unsure === 0 ? text("queue.accept_all_hint", { percent }) : text("queue.accept_sure_hint", { percent, unsure });
     setEnabled(button, whyNot("AcceptAll") ?? (sure === 0 ? none : null), hint);

@@ -2,7 +2,6 @@
 
 import { ask } from "../link/api.js";
 import { pageState, points } from "../state/page-state.js";
-import { reason } from "../state/reasons.js";
 import { counted, text } from "../state/texts.js";
 import { countOf, whyNot, whyNotPoint } from "./allowed.js";
 
@@ -49,7 +48,7 @@ export function whyNoMove() {
 
 /** Why the order cannot be reset to the plan's. */
 export function whyNoResetOrder() {
-  return whyNot("ResetOrder") ?? (orderedBy() ? null : reason("order_of_plan"));
+  return whyNot("ResetOrder");
 }
 
 /**

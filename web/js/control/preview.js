@@ -22,9 +22,9 @@ export function hasPreview() {
   return preview.get()?.preview_hash ? true : false;
 }
 
-/** Why no preview can be requested. @param {number} accepted Number of accepted points. */
-export function whyNoPreview(accepted) {
-  return whyNot("RequestPreview") ?? (accepted === 0 ? reason("none_accepted") : null);
+/** Why no preview can be requested. */
+export function whyNoPreview() {
+  return whyNot("RequestPreview");
 }
 
 /** Why the preview cannot be approved. */
