@@ -142,9 +142,7 @@ def _read(folder: Path) -> Dataset:
 
 def _write(path: Path, tuner: "Tuner", datasets: Sequence[Dataset]) -> dict[str, Figures]:
     """Write the best network; returns its figures on the held-out pictures, of the file itself."""
-    network = tuner.best()
-    pictures = [dataset.load(name) for dataset in datasets for name in dataset.names("held-out")]
-    temperature = _temperature(network, [_scaled(color, labels, 1.0, 0) for color, labels in pictures])
+    network, temperature = tuner.best()
     path.parent.mkdir(parents=True, exist_ok=True)
     new = path.with_suffix(".new.onnx")
     write_onnx(new, network, temperature)
@@ -155,11 +153,12 @@ def _write(path: Path, tuner: "Tuner", datasets: Sequence[Dataset]) -> dict[str,
 
 @dataclass(frozen=True)
 class Judgement:
-    """A point of the curve: step, mean loss since the last one, and F on the held-out pictures."""
+    """A point of the curve: step, mean loss since the last one, and F on the held-out pictures at a temperature."""
 
     step: int
     loss: float
     f: float
+    temperature: float
 
 
 class Tuner:
@@ -182,6 +181,8 @@ class Tuner:
         network.eval()
         self._artist = Artist(size)
         self._pictures = [dataset.load(name) for dataset in datasets for name in dataset.names("train")]
+        held_out = [dataset.load(name) for dataset in datasets for name in dataset.names("held-out")]
+        self._held_out = [_scaled(color, labels, 1.0, 0) for color, labels in held_out]
         encoder = set(network.encoder.parameters())
         decoder = [parameter for parameter in network.parameters() if parameter not in encoder]
         groups = [{"params": decoder, "lr": _RATE}, {"params": list(network.encoder.parameters()), "lr": _ENCODER_RATE}]
@@ -208,20 +209,22 @@ class Tuner:
 
     def judge(self, loss: float = float("nan")) -> None:
         """Judge on the held-out pictures, and remember the weights if they are the best so far."""
-        segmenter = _TorchSegmenter(self._network)
+        # Which class is told depends on the temperature, since wood is told from a low probability on.
+        temperature = _temperature(self._network, self._held_out)
+        segmenter = _TorchSegmenter(self._network, temperature)
         values = [_mean_f(judge_held_out(segmenter, dataset)) for dataset in self._datasets]
         f = float(np.mean(values))
         if not self.curve or f > max(each.f for each in self.curve):
             self._best, self.waited = copy.deepcopy(self._network.state_dict()), 0
         else:
             self.waited += 1
-        self.curve.append(Judgement(self.step, loss, f))
+        self.curve.append(Judgement(self.step, loss, f, temperature))
 
-    def best(self) -> PhotographNetwork:
-        """The network that was best on the held-out pictures."""
+    def best(self) -> tuple[PhotographNetwork, float]:
+        """The network that was best on the held-out pictures, and its temperature."""
         out: PhotographNetwork = copy.deepcopy(self._network)
         out.load_state_dict(self._best)
-        return out
+        return out, max(self.curve, key=lambda each: each.f).temperature
 
     def state(self) -> dict[str, object]:
         """Everything that `restore` needs."""
@@ -232,7 +235,7 @@ class Tuner:
             "network": self._network.state_dict(),
             "best": self._best,
             "optimiser": self._optimiser.state_dict(),
-            "curve": [(each.step, each.loss, each.f) for each in self.curve],
+            "curve": [(each.step, each.loss, each.f, each.temperature) for each in self.curve],
         }
 
     def restore(self, state: dict[str, object], path: Path) -> None:
@@ -310,8 +313,8 @@ def _mean_f(figures: Figures) -> float:
 class _TorchSegmenter:
     """Tells classes as the exported network will."""
 
-    def __init__(self, network: PhotographNetwork) -> None:
-        self._answer = Answer(copy.deepcopy(network), 1.0).eval()
+    def __init__(self, network: PhotographNetwork, temperature: float) -> None:
+        self._answer = Answer(copy.deepcopy(network), temperature).eval()
 
     def classify_surely(
         self, color: NDArray[np.uint8], depth: NDArray[np.float32] | None
