@@ -79,7 +79,7 @@ def _newest(ledger: Ledger, kind: str, row: type[Row]) -> list[Row]:
     found = []
     for name, body in ledger.newest(kind):
         try:
-            found.append(msgspec.convert(_upgraded(kind, msgspec.json.decode(body)), row))
+            found.append(msgspec.convert(_upgraded(msgspec.json.decode(body)), row))
         except msgspec.MsgspecError as error:
             raise LedgerError(
                 f"the ledger {ledger.path} tells of {kind} {name} what this version, {__version__}, does not "
@@ -89,9 +89,9 @@ def _newest(ledger: Ledger, kind: str, row: type[Row]) -> list[Row]:
     return found
 
 
-def _upgraded(kind: str, body: Any) -> Any:
+def _upgraded(body: Any) -> Any:
     """A decoded row in the form of this schema version."""
-    if kind != "ticket" or not isinstance(body, dict):
+    if not isinstance(body, dict):
         return body
     if body.get("state") == "INTENT":
         body["state"] = "CUTTING"

@@ -210,11 +210,12 @@ def test_a_ledger_of_an_older_version_is_whole_and_goes_on(tmp_path: Path, versi
     assert verify(tmp_path).problem == ""
 
 
-def test_rows_of_a_newer_version_are_refused_by_naming_the_version(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("kind", "body"), [("order", '{"of_next_year": true}'), ("ticket", "[1, 2]")])
+def test_rows_of_a_newer_version_are_refused_by_naming_the_version(tmp_path: Path, kind: str, body: str) -> None:
     with Ledger(tmp_path) as ledger:
         ledger.append([Entry("t", "start", "controller", '{"program": {"version": "7.1.0"}, "robots": 2}')])
-        ledger.append([Entry("t", "order", "order", '{"of_next_year": true}')])
-    with pytest.raises(LedgerError, match=r"tells of order.*last written by version 7\.1\.0: use that version"):
+        ledger.append([Entry("t", kind, "name", body)])
+    with pytest.raises(LedgerError, match=rf"tells of {kind}.*last written by version 7\.1\.0: use that version"):
         restored(tmp_path)
 
 

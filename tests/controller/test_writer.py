@@ -143,6 +143,8 @@ def test_a_flood_of_lines_is_counted_instead_of_recorded(writers):
     assert (disk.rows[200].kind, disk.rows[200].name) == ("event", "controller")
     left_out = json.loads(disk.rows[200].body)
     assert writer.state.durable == 0
+    assert left_out["process"] == "controller"
+    assert left_out["header"] == json.loads(disk.rows[201].body)["header"]
     assert (
         left_out["reason"] == {"code": "lines_unrecorded", "values": [["lines", 800]]}
         and "after" in disk.rows[201].body
