@@ -43,7 +43,7 @@ class Vocabulary:
     rest: str
 
 
-#: From the papers; the files themselves were not at hand.
+#: Not verified: the files were not at hand. The labels of Extremadura are from its paper.
 VOCABULARIES = {
     # Gentilhomme and others, "Towards smart pruning: ViNet", 2023.
     "3d2cut": Vocabulary(
