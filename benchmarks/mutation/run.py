@@ -128,7 +128,7 @@ def lay_out(name: str, target: Target) -> Path:
         _link(folder / "mutants" / word, ROOT / word)
     words = {
         "code": json.dumps(_CODE),
-        "files": json.dumps(target.files),
+        "files": json.dumps(target.paths(ROOT)),
         "tests": json.dumps([f"tests/{test}" for test in target.tests]),
     }
     settings = (ROOT / "pyproject.toml").read_text(encoding="utf-8") + _SETTINGS.format(**words)

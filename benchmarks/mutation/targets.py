@@ -1,6 +1,7 @@
 """What is mutated, and which tests have to notice."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 
 @dataclass(frozen=True)
@@ -14,6 +15,11 @@ class Target:
 
     files: tuple[str, ...]
     tests: tuple[str, ...]
+
+    def paths(self, root: Path) -> list[str]:
+        """The files below a checkout's root that are mutated."""
+        found = (path for pattern in self.files for path in root.glob(pattern))
+        return sorted({path.relative_to(root).as_posix() for path in found if path.suffix == ".py"})
 
 
 def _tests(folder: str, names: str) -> tuple[str, ...]:

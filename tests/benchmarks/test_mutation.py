@@ -12,6 +12,7 @@ from rolling_panda.errors import InputError
 def test_every_target_has_files_and_tests() -> None:
     for target in TARGETS.values():
         assert all(list(ROOT.glob(pattern)) for pattern in target.files)
+        assert not any(path.startswith(("bridge/sim/", "bridge/fakes/")) for path in target.paths(ROOT))
         assert all((ROOT / "tests" / test).exists() for test in target.tests)
 
 
