@@ -18,6 +18,7 @@ from bridge.core.fence import SILENT_S, Fence
 from bridge.core.odometer import Odometer
 from bridge.core.state_memory import Remembered, begin_anew, open_memory
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.errors import InputError, MessageError
 from rolling_panda.messages.types import MOST_EPOCHS
 from rolling_panda.reasons import text_of
@@ -129,7 +130,8 @@ class Askers(RuleBasedStateMachine):
         self.start()
         assert self.memory is not None
         (stop,) = self.memory.value.stops
-        assert stop.reason.code == "bridge_state_set_aside"
+        aside = (self.folder / FILE).with_suffix(".aside")
+        assert stop.reason == reasons.bridge_state_set_aside(str(aside)) and aside.read_bytes() == content
         assert self.core.on_release(m.ReleaseStop(stop_id=stop.stop_id, user="ada", reason="looked"), self.now).ok
 
     @invariant()
