@@ -15,8 +15,9 @@ from hypothesis import strategies as st
 from rolling_panda import messages as m
 from rolling_panda.errors import MessageError
 from rolling_panda.generate.description import reachable
+from rolling_panda.reasons import text_of
 from rolling_panda.topics import SERVICES, TOPICS
-from rolling_panda.transport.codec import StrictDecoder, encode
+from rolling_panda.transport.codec import StrictDecoder, UndecodableError, encode
 
 KINDS: list[Any] = [topic.message for topic in TOPICS] + [r for s in SERVICES for r in s.requests] + [m.Answer]
 DECODERS = {kind: StrictDecoder(kind) for kind in KINDS}
@@ -171,6 +172,15 @@ def test_a_refusal_names_the_field() -> None:
     tree["xi"][3] = math.nan
     with pytest.raises(MessageError, match=r"\$\.xi\[3\]|\$\.xi\[\.\.\.\]"):
         DECODERS[m.MotionCommand].decode(msgspec.msgpack.encode(tree))
+
+
+def test_a_refusal_has_a_reason_and_its_text() -> None:
+    data = b"no message"
+    with pytest.raises(UndecodableError) as caught:
+        DECODERS[m.MotionCommand].decode(data)
+    reason = caught.value.reason
+    assert (reason.code, dict(reason.values)["size"]) == ("message_undecodable", len(data))
+    assert str(caught.value) == text_of(reason)
 
 
 @given(st.binary(max_size=300), st.sampled_from(KINDS))
