@@ -1,7 +1,8 @@
 """What `ControllerState.allowed` tells of each command is what the controller then answers."""
 
 import msgspec
-from hypothesis import given
+import pytest
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from controller.planning.preview_plan import Preview, PreviewRequest
@@ -149,6 +150,8 @@ EVENTS = (*VIEWS, "stop", "silent bridge", "watchdog", "closing", "server", "per
 USUAL = (intents.Arm, intents.AcceptAll, intents.RequestPreview, intents.ApprovePreview, intents.Start, intents.Reset)
 
 
+@pytest.mark.long
+@settings(max_examples=25)
 @given(st.data())
 def test_whatever_has_happened_a_command_is_answered_as_it_was_told(data):
     world = World()
