@@ -358,8 +358,8 @@ def add_trellis(rng: np.random.Generator, tubes: Tubes, z: float, height: float,
                 gray,
                 PLASTIC,
             )
-    for _ in range(int(rng.integers(0, 3))):
-        at_x = float(rng.uniform(-wide, wide) * 0.6)
+    for _ in range(int(rng.choice(5, p=[0.25, 0.3, 0.2, 0.15, 0.1]))):
+        at_x = float(rng.uniform(-wide, wide) * 0.35)
         style = rng.choice(["steel", "wood", "stake", "concrete"], p=[0.35, 0.3, 0.25, 0.1])
         radius = {
             "steel": rng.uniform(0.015, 0.04),
@@ -373,11 +373,14 @@ def add_trellis(rng: np.random.Generator, tubes: Tubes, z: float, height: float,
             "stake": np.array(rng.choice([[110, 70, 50], [60, 60, 62], [170, 150, 110], [60, 90, 60]], axis=0), float),
             "concrete": np.array([170.0, 166.0, 158.0]),
         }[style]
-        top = np.array([at_x + rng.normal(0.0, 0.15), rng.uniform(0.5, 2.3), z + rng.normal(0.0, 0.1)])
-        foot = np.array([at_x, -0.1, z + rng.normal(0.0, 0.06)])
+        # Some stand between the camera and the vines.
+        at_z = z * float(rng.choice([1.0, rng.uniform(0.6, 1.0)])) + rng.normal(0.0, 0.06)
+        top = np.array([at_x + rng.normal(0.0, 0.15), rng.uniform(0.5, 2.3), at_z + rng.normal(0.0, 0.1)])
+        foot = np.array([at_x, -0.1, at_z])
         points = foot + (top - foot) * np.linspace(0.0, 1.0, 30)[:, None]
         surface = {"steel": METAL, "wood": BARK, "stake": SMOOTH, "concrete": SMOOTH}[style]
-        tubes.add(points, np.full(30, radius), kind(POST), color, surface, float(rng.uniform(0.05, 0.4)))
+        rough = float(rng.uniform(0.02, 0.12) if style == "steel" else rng.uniform(0.05, 0.4))
+        tubes.add(points, np.full(30, radius), kind(POST), color, surface, rough)
     for _ in range(int(rng.integers(0, 6))):
         at = np.array([rng.uniform(-wide, wide) * 0.7, height + rng.normal(0.0, 0.3), z])
         ring = at + np.column_stack(

@@ -205,7 +205,9 @@ class Artist:
         focal = float(np.exp(rng.uniform(np.log(420.0), np.log(760.0)))) * _OVER
         # The picture is a part of a larger one, anywhere in it; its middle looks at the vine.
         off = rng.uniform(-0.5, 0.5, 2) * [528 * _OVER, 160 * _OVER]
-        t = np.array([rng.uniform(-0.9, 0.9), max(0.15, height + rng.normal(0.15, 0.22)), 0.0])
+        # Most pictures show spurs and canes, some the trunk.
+        level = float(rng.choice([height + rng.normal(0.15, 0.22), height * rng.uniform(0.5, 1.0)], p=[0.8, 0.2]))
+        t = np.array([rng.uniform(-0.9, 0.9), max(0.15, level), 0.0])
         middle = np.array([t[0] + np.tan(yaw) * away, t[1], away])
         focused = (middle - t) @ R.T
         place = focal * focused[:2] / max(focused[2], 0.1)

@@ -22,6 +22,8 @@ from rolling_panda.messages.types import WOOD_CLASSES, WoodClass
 _HEAVIER: dict[WoodClass, float] = {
     "background": 0.4,
     "ground": 0.3,
+    "post": 1.5,
+    "trunk": 1.5,
     "cordon": 1.5,
     "spur": 2.0,
     "cane": 1.5,
