@@ -124,7 +124,8 @@ def test_classes_depth_and_colour_agree(scenes):
 
 def test_the_pictures_are_as_varied_as_they_are_meant_to_be(scenes):
     shares = np.array([[(scene.labels == k).mean() for k in range(FAR)] for scene in scenes])
-    assert (shares[:, list(WOOD)].sum(axis=1) > 0.005).mean() > 0.6
+    # A third of the width of the training pictures, of which five in six show wood.
+    assert (shares[:, list(WOOD)].sum(axis=1) > 0.005).mean() > 0.4
     assert all((shares[:, k] > 0.0).any() for k in range(FAR))
     drawings = [scene.photograph(np.random.default_rng(number)) for number, scene in enumerate(scenes)]
     assert np.ptp([each.color.mean() for each in drawings]) > 100.0
