@@ -122,6 +122,11 @@ def test_classes_depth_and_colour_agree(scenes):
         assert (scene.depth[wood] < 6.0).mean() > 0.99 if wood.any() else True
 
 
+def test_where_nothing_stands_nothing_is_traced():
+    traced = trace(Tubes(), Lens(np.eye(3), np.zeros(3), 80.0, 40.0, 40.0), 80)
+    assert (traced.kind == BACKGROUND).all() and np.isinf(traced.depth).all()
+
+
 def test_the_pictures_are_as_varied_as_they_are_meant_to_be(scenes):
     shares = np.array([[(scene.labels == k).mean() for k in range(FAR)] for scene in scenes])
     # A third of the width of the training pictures, of which five in six show wood.

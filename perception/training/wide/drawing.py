@@ -125,7 +125,8 @@ class Traced:
 
 def trace(tubes: Tubes, lens: Lens, size: int) -> Traced:
     """Draw tubes into a square image; those behind or at the camera are left out."""
-    ends = np.concatenate(tubes.ends)
+    # There may be none at all: a picture of the background alone.
+    ends = np.concatenate([np.empty((0, 8)), *tubes.ends])
     a, uv_a = lens.project(ends[:, :3])
     b, uv_b = lens.project(ends[:, 4:7])
     kept = np.flatnonzero((a[:, 2] > _NEAR) & (b[:, 2] > _NEAR))
@@ -136,7 +137,7 @@ def trace(tubes: Tubes, lens: Lens, size: int) -> Traced:
     draw_cones(cones, depth, index, across, along)
     # An index of -1 is the last entry of each.
     cone = np.append(kept, -1)[index]
-    kind = np.append(np.concatenate(tubes.kind), BACKGROUND)[cone].astype(np.uint8)
+    kind = np.concatenate([*tubes.kind, [BACKGROUND]])[cone].astype(np.uint8)
     return Traced(depth, cone, kind, across, along, uv_b - uv_a)
 
 
