@@ -76,12 +76,14 @@ def main(argv: Sequence[str] | None = None) -> int:
         result = find_cuts(photograph, labels, config)
         arguments.out.mkdir(parents=True, exist_ok=True)
         _write(arguments.out, arguments.image, photograph, labels, result, segmenter.name)
+        scale = photograph.size[0] / labels.shape[1]
     except (RollingPandaError, OSError) as error:
         print(f"rolling-panda perceive: {error}", file=sys.stderr)
         return 1
     print(f"{len(result.cuts)} points on {result.spurs} spurs; scale: {result.scale}")
-    for reason in result.undecided:
-        print(f"undecided: {text_of(reason)}")
+    for each in result.undecided:
+        pixel = _full(each.pixel, scale)
+        print(f"undecided{f' at {pixel[0]:.0f}, {pixel[1]:.0f}' if pixel else ''}: {text_of(each.reason)}")
     return 0
 
 
@@ -104,6 +106,10 @@ def _write(out: Path, image: Path, photograph: Photograph, labels: Labels, resul
     draw = ImageDraw.Draw(overlay)
     for number, cut in enumerate(result.cuts, 1):
         _mark(draw, cut, number, scale)
+    for each in result.undecided:
+        if each.pixel is not None:
+            u, v = (np.array(each.pixel) + 0.5) * scale
+            draw.ellipse((u - _MARK, v - _MARK, u + _MARK, v + _MARK), outline=(255, 255, 255), width=2)
     overlay.save(out / "overlay.png")
     document = {
         "image": image.name,
@@ -115,7 +121,7 @@ def _write(out: Path, image: Path, photograph: Photograph, labels: Labels, resul
         "spurs": result.spurs,
         "canes": result.canes,
         "points": [_point(cut, photograph, scale) for cut in result.cuts],
-        "undecided": [text_of(reason) for reason in result.undecided],
+        "undecided": [{"reason": text_of(each.reason), "pixel": _full(each.pixel, scale)} for each in result.undecided],
     }
     (out / "points.json").write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
 
@@ -130,15 +136,19 @@ def _mark(draw: ImageDraw.ImageDraw, point: ImageCut, number: int, scale: float)
     draw.text((u + abs(du) + 3, v - 6), str(number), fill=(230, 30, 30))
 
 
+def _full(pixel: tuple[float, float] | None, scale: float) -> list[float] | None:
+    """A pixel of the scaled image in the photograph itself."""
+    return None if pixel is None else [round((value + 0.5) * scale - 0.5, 1) for value in pixel]
+
+
 def _point(point: ImageCut, photograph: Photograph, scale: float) -> dict[str, Any]:
     cut = point.cut
     metric = photograph.depth is not None
-    pixel = (np.array(point.pixel) + 0.5) * scale - 0.5
     along = np.array(point.beyond) - np.array(point.pixel)
     return {
         "kind": cut.kind,
         "spur": point.spur,
-        "pixel": [round(float(value), 1) for value in pixel],
+        "pixel": _full(point.pixel, scale),
         "direction": [round(float(value), 4) for value in along / max(float(np.linalg.norm(along)), 1e-9)],
         "position": [round(float(value), 5) for value in cut.position @ R_LEVEL] if metric else None,
         "tangent": [round(float(value), 5) for value in cut.tangent @ R_LEVEL] if metric else None,

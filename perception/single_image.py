@@ -10,14 +10,14 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 from PIL import Image, ImageOps
-from scipy.ndimage import distance_transform_edt
+from scipy.ndimage import center_of_mass, distance_transform_edt, label
 from skimage.morphology import skeletonize
 
 from perception.arrays import Labels, Mask
 from perception.config import PerceptionConfig
 from perception.rules.keep_out import frame_keep_out
 from perception.rules.pruning import Cut, apply_rule
-from perception.segmentation.frame import CANE, NODE, View
+from perception.segmentation.frame import CANE, CORDON, NODE, TRUNK, View
 from perception.skeleton.topology import perceive_plant
 from rolling_panda import reasons
 from rolling_panda.errors import InputError
@@ -41,6 +41,11 @@ _MIN_CANE_WIDTH, _MIN_CANE_PIXELS = 2.0, 40
 _SCALE_UNCERTAINTY = 1.6
 #: A second image point of a cut is this far along the wood (m).
 _ALONG = 0.02
+#: Canes begin so near to trunk or cordon, and bases nearer to each other are one (widths of a cane).
+_BASE_GAP, _SAME_BASE = 3.0, 8.0
+#: Least size of a cane that begins there and of a part of trunk or cordon, in squares of a cane's width: not a speck.
+_LEAST_CANE, _LEAST_OLD_WOOD = 20.0, 40.0
+_EIGHT = np.ones((3, 3))
 #: Rotation of a level camera: x right, y down, z forward become x right, y forward, z up.
 R_LEVEL = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 
@@ -166,11 +171,16 @@ def _wide_enough(labels: Labels) -> int:
 
 
 def cane_width(labels: Labels) -> float | None:
-    """Median width of the canes (px) along their middle lines; None where too few pixels are of canes."""
+    """Width of the cane at the median cane pixel (px); None where too few pixels are of canes.
+
+    So many specks and canes of rows behind, which have more length than pixels, do not decide.
+    """
     wood = _cane_mask(labels)
     if np.count_nonzero(wood) < _MIN_CANE_PIXELS:
         return None
-    return 2.0 * float(np.median(distance_transform_edt(wood)[skeletonize(wood)])) - 1.0
+    widths = np.sort(2.0 * distance_transform_edt(wood)[skeletonize(wood)] - 1.0)
+    pixels = np.cumsum(widths)
+    return float(widths[np.searchsorted(pixels, pixels[-1] / 2.0)])
 
 
 def _color(path: Path) -> NDArray[np.uint8]:
@@ -246,19 +256,32 @@ class ImageCut:
 
 
 @dataclass(frozen=True)
+class Undecided:
+    """A place without a cut, or a photograph without any.
+
+    Attributes:
+        reason: Reason.
+        pixel: Column and row in the scaled image; None where it is about the whole of it.
+    """
+
+    reason: Reason
+    pixel: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
 class ImageResult:
     """Cuts in one photograph.
 
     Attributes:
         cuts: Proposed cuts.
-        undecided: Reasons for what is undecided.
+        undecided: What is undecided, and why.
         spurs: Number of spurs.
         canes: Number of canes rooted at a spur.
         scale: Source of the scale, as text.
     """
 
     cuts: tuple[ImageCut, ...]
-    undecided: tuple[Reason, ...]
+    undecided: tuple[Undecided, ...]
     spurs: int
     canes: int
     scale: str
@@ -275,40 +298,73 @@ def find_cuts(photograph: Photograph, labels: Labels, config: PerceptionConfig) 
     if photograph.depth is None:
         assumed = _assumed_depth(photograph, labels)
         if isinstance(assumed, Reason):
-            return ImageResult((), (assumed,), 0, 0, "none")
+            return ImageResult((), (Undecided(assumed),), 0, 0, "none")
         depth = np.full(labels.shape, assumed, np.float32)
         config = _with_scale_uncertainty(config)
         scale = f"no depth: the median cane is taken to be {1000 * _COMMON_DIAMETER:.0f} mm thick"
     else:
         depth, scale = photograph.depth, "depth image"
         if np.count_nonzero(_cane_mask(labels) & (depth > 0.0)) < _MIN_CANE_PIXELS:
-            return ImageResult((), (reasons.no_cane_with_depth(),), 0, 0, scale)
+            return ImageResult((), (Undecided(reasons.no_cane_with_depth()),), 0, 0, scale)
     view = photograph.view(depth)
     plant = perceive_plant(view, labels, config.skeleton)
     cuts: list[ImageCut] = []
-    undecided: list[Reason] = []
+    undecided: list[Undecided] = []
+    places: list[tuple[float, float]] = []
     keep_out = frame_keep_out(view, labels, (), config.rule)
     for number, spur in enumerate(plant.spurs, 1):
         decision = apply_rule(spur, config.rule, plant.other_canes(spur), keep_out)
-        undecided += [reasons.spur_left(number, reason) for reason in decision.undecided]
+        places.append(_pixel(view, spur.position))
+        undecided += [Undecided(reasons.spur_left(number, reason), places[-1]) for reason in decision.undecided]
         for cut in decision.cuts:
-            u, v, _ = view.pixels(cut.position)[0]
-            x, y, _ = view.pixels(cut.position + _ALONG * cut.tangent)[0]
-            cuts.append(ImageCut(cut, (float(u), float(v)), (float(x), float(y)), number))
+            beyond = _pixel(view, cut.position + _ALONG * cut.tangent)
+            cuts.append(ImageCut(cut, _pixel(view, cut.position), beyond, number))
+    undecided += [Undecided(reasons.cane_without_spur(), base) for base in _bases(labels, places)]
     if not plant.spurs:
-        undecided.append(reasons.no_spur_recognised())
+        undecided.append(Undecided(reasons.no_spur_recognised()))
     return ImageResult(tuple(cuts), tuple(undecided), len(plant.spurs), sum(len(s.canes) for s in plant.spurs), scale)
 
 
+def _pixel(view: View, point: NDArray[np.float64]) -> tuple[float, float]:
+    u, v, _ = view.pixels(point)[0]
+    return float(u), float(v)
+
+
+def _bases(labels: Labels, known: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Where canes begin at trunk or cordon, far from places that are known (pixels)."""
+    width = cane_width(labels)
+    if width is None:
+        return []
+    canes = _large(_cane_mask(labels), _LEAST_CANE * width**2)
+    old_wood = _large(np.isin(labels, (TRUNK, CORDON)), _LEAST_OLD_WOOD * width**2)
+    if not old_wood.any():
+        return []
+    contact, count = label(canes & (distance_transform_edt(~old_wood) <= _BASE_GAP * width), _EIGHT)
+    out: list[tuple[float, float]] = []
+    for row, column in center_of_mass(contact, contact, range(1, count + 1)):
+        if all(np.hypot(column - u, row - v) > _SAME_BASE * width for u, v in (*known, *out)):
+            out.append((float(column), float(row)))
+    return out
+
+
+def _large(mask: Mask, pixels: float) -> Mask:
+    """The connected parts of a mask with more than so many pixels."""
+    parts, _ = label(mask, _EIGHT)
+    large = np.bincount(parts.ravel()) > pixels
+    large[0] = False
+    out: Mask = large[parts]
+    return out
+
+
 def _with_scale_uncertainty(config: PerceptionConfig) -> PerceptionConfig:
-    """Wider limits of plausible internodes, for lengths of uncertain scale."""
+    """Any distance, and wider limits of plausible internodes, for lengths of uncertain scale."""
     rule = replace(
         config.rule,
         min_node_distance=config.rule.min_node_distance / _SCALE_UNCERTAINTY,
         min_internode=config.rule.min_internode / _SCALE_UNCERTAINTY,
         max_internode=config.rule.max_internode * _SCALE_UNCERTAINTY,
     )
-    return replace(config, rule=rule)
+    return replace(config, rule=rule, skeleton=replace(config.skeleton, min_depth=0.0, max_depth=np.inf))
 
 
 def _cane_mask(labels: Labels) -> Mask:

@@ -1666,6 +1666,11 @@ def no_cane_with_depth() -> None:
     """No cane with depth was recognised."""
 
 
+@_reason("info", "look again from nearer")
+def cane_without_spur() -> None:
+    """A cane begins here at trunk or cordon, but no spur was recognised."""
+
+
 @_reason("info", "")
 def no_spur_recognised() -> None:
     """No spur was recognised: the cordon with its spurs must be in the picture."""

@@ -5,28 +5,38 @@ and tolerance are in pixels of the photograph; the network itself sees it as `pe
 """
 
 from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageOps
+from scipy.ndimage import center_of_mass, distance_transform_edt, label
 from skimage.color import rgb2lab
 from skimage.filters import sato
 
 from benchmarks.common.documents import bench_parser, write
 from perception.arrays import Labels, Mask
+from perception.config import PerceptionConfig
 from perception.models.judge import SAME, TOGETHER, Agreement, compared, tell
+from perception.pipeline import with_width_bias
 from perception.segmentation.frame import CANE
 from perception.segmentation.network_segmenter import NetworkSegmenter
 from perception.segmentation.segmenter import SHIPPED
-from perception.single_image import load_photograph
+from perception.single_image import Photograph, find_cuts, load_photograph, segment_photograph
 from rolling_panda.errors import InputError
 from rolling_panda.resources import resource
 
 #: The best share of a ridge filter's pixels, and the widths it looks for (px of the photograph).
 _DECILE, _WIDTHS = 90.0, (2.0, 3.0, 4.0)
 _SUFFIXES = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp", ".bmp")
+#: Canes begin where their mask is so near to that of trunk or cordon (share of the photograph's width).
+_TOUCHING = 0.004
+#: Bases nearer to each other are one; a base is told by a point or a reason so near to it (share of the width).
+_NEAR_BASE = 0.03
+#: A point with more confidence than this must be on a cane.
+_CONFIDENT = 0.8
 #: Width of a picture in the gallery (px).
 _SHOWN = 960
 
@@ -56,8 +66,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     if not 0.0 <= words.tolerance <= 100.0:
         raise InputError(f"--tolerance {words.tolerance}: give 0 to 100 pixels")
     classes = tuple(name.strip() for name in words.classes.split(","))
-    method = ridge if words.method == "ridge" else network(words.weights)
+    segmenter = None if words.method == "ridge" else NetworkSegmenter(words.weights or resource(SHIPPED))
+    method = ridge if segmenter is None else network(segmenter)
     totals = {name: Agreement() for name in (*SAME, *TOGETHER)}
+    places = Places()
     results: list[dict[str, Any]] = []
     shown: list[tuple[float, NDArray[np.uint8]]] = []
     for path, mask_path in pairs(words.photographs, words.masks):
@@ -69,11 +81,15 @@ def main(argv: Sequence[str] | None = None) -> int:
         for name, true, said in compared(truth, told):
             own[name].add(true, said, words.tolerance, likely)
             totals[name].add(true, said, words.tolerance, likely)
+        if segmenter is not None:
+            places.add(truth, load_photograph(path), segmenter, words.tolerance)
         results.append({"photograph": path.name, **{name: each.figures() for name, each in own.items()}})
         if words.gallery is not None:
             shown.append((own["wood"].figures()["f"] or 0.0, tile(path, truth, told)))
     for name, each in totals.items():
         print(line(name, each.figures()))
+    if segmenter is not None:
+        print(places.line())
     if words.gallery is not None:
         shown.sort(key=lambda entry: entry[0])
         words.gallery.parent.mkdir(parents=True, exist_ok=True)
@@ -84,6 +100,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "tolerance_px": words.tolerance,
         "photographs": len(results),
         "summary": {name: each.figures() for name, each in totals.items()},
+        "places": None if segmenter is None else asdict(places),
         "results": results,
     }
     write(words.json, document)
@@ -130,14 +147,68 @@ def load_mask(path: Path, classes: Sequence[str]) -> dict[str, Mask]:
     return {name: np.isin(values, [k for k, each in enumerate(classes) if each == name]) for name in SAME}
 
 
-def network(weights: Path | None) -> Method:
-    """The network as `perceive` uses it.
+@dataclass
+class Places:
+    """Where canes begin, in the masks and as `perceive` tells them.
 
-    Raises:
-        ConfigError: The weights do not fit.
+    Attributes:
+        bases: Places in the masks where a cane meets trunk or cordon.
+        told: Of these, with a point or a reason near.
+        reasons: Points and reasons with a place.
+        at_base: Of these, near a base.
+        points: Points.
+        wrong: Points of high confidence on no cane.
     """
-    segmenter = NetworkSegmenter(weights or resource(SHIPPED))
 
+    bases: int = 0
+    told: int = 0
+    reasons: int = 0
+    at_base: int = 0
+    points: int = 0
+    wrong: int = 0
+
+    def add(self, truth: dict[str, Mask], whole: Photograph, segmenter: NetworkSegmenter, tolerance: float) -> None:
+        """Count one photograph."""
+        photograph, (labels, _) = segment_photograph(whole, segmenter)
+        result = find_cuts(photograph, labels, with_width_bias(PerceptionConfig(), segmenter.width_bias))
+        scale = whole.size[0] / labels.shape[1]
+        located = [cut.pixel for cut in result.cuts]
+        located += [each.pixel for each in result.undecided if each.pixel is not None]
+        said = (np.array(located).reshape(-1, 2) + 0.5) * scale - 0.5
+        true, near = bases(truth), _NEAR_BASE * whole.size[0]
+        gaps = np.hypot(*(true[:, None] - said[None]).transpose(2, 0, 1))
+        self.bases += len(true)
+        self.told += int((gaps.min(axis=1, initial=np.inf) <= near).sum())
+        self.reasons += len(said)
+        self.at_base += int((gaps.min(axis=0, initial=np.inf) <= near).sum())
+        self.points += len(result.cuts)
+        off = distance_transform_edt(~truth["cane"])
+        for (u, v), cut in zip(said, result.cuts, strict=False):
+            self.wrong += bool(cut.cut.confidence > _CONFIDENT and off[round(v), round(u)] > tolerance)
+
+    def line(self) -> str:
+        """For people."""
+        return (
+            f"canes begin at {self.bases} places: {self.told} have a point or a reason; of {self.reasons} points and "
+            f"reasons {self.at_base} are at such a place; {self.points} points, {self.wrong} sure but on no cane"
+        )
+
+
+def bases(truth: dict[str, Mask]) -> NDArray[np.float64]:
+    """Columns and rows of the places where the mask of canes meets trunk or cordon (N×2)."""
+    old_wood = truth["trunk"] | truth["cordon"]
+    contact = truth["cane"] & (distance_transform_edt(~old_wood) <= _TOUCHING * old_wood.shape[1])
+    if not (contact.any() and old_wood.any()):
+        return np.empty((0, 2))
+    # What is nearer to each other than that is one part after it was widened by half of it.
+    wide = distance_transform_edt(~contact) <= _NEAR_BASE / 2 * old_wood.shape[1]
+    parts, count = label(wide, np.ones((3, 3)))
+    middles = center_of_mass(contact, parts, range(1, count + 1))
+    return np.array(middles, float).reshape(-1, 2)[:, ::-1]
+
+
+def network(segmenter: NetworkSegmenter) -> Method:
+    """The network as `perceive` uses it."""
     return lambda path: tell(load_photograph(path), segmenter)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from benchmarks.perception.photographs import load_mask, main
+from benchmarks.perception.photographs import bases, load_mask, main
 from rolling_panda.errors import InputError
 from rolling_panda.messages.types import WOOD_CLASSES
 from tests.support.onnx_by_hand import brightest_channel
@@ -67,6 +67,14 @@ def test_the_network_sees_the_photograph_and_answers_at_its_own_size(tmp_path):
     found = json.loads((tmp_path / "f.json").read_text(encoding="utf-8"))
     assert found["weights"] == "dark.onnx" and found["summary"]["trunk"]["iou"] > 0.9
     assert found["summary"]["cane"]["recall"] is None and found["summary"]["trunk and cordon"]["precision"] == 1.0
+
+
+def test_canes_begin_where_their_mask_meets_the_cordon():
+    mask = np.zeros((100, 300), np.uint8)
+    mask[60:70] = 3
+    mask[10:60, 50:54] = mask[10:60, 200:205] = mask[:30, 250:254] = 2
+    truth = {name: mask == k for k, name in enumerate(CLASSES)}
+    assert np.allclose(bases(truth), [[51.5, 59.0], [202.0, 59.0]], atol=1.0)
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
+from scipy.ndimage import distance_transform_edt
 
 from bridge.sim.camera.config import CameraConfig
 from bridge.sim.camera.renderer import Camera
@@ -14,8 +15,8 @@ from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
 from bridge.sim.vineyard.truth import judge
 from perception.config import PerceptionConfig
-from perception.segmentation.frame import BACKGROUND, CANE
-from perception.single_image import Photograph, cane_width, find_cuts, load_photograph, segment_photograph
+from perception.segmentation.frame import BACKGROUND, CANE, CORDON, NODE, SPUR, TRUNK
+from perception.single_image import Photograph, Undecided, cane_width, find_cuts, load_photograph, segment_photograph
 from rolling_panda import reasons
 from rolling_panda.errors import InputError
 from rolling_panda.messages.robot import Intrinsics
@@ -63,14 +64,34 @@ def test_a_picture_without_wood_gives_a_reason_and_no_point(picture):
     flat = Photograph(photograph.color, None, photograph.intrinsics, True, (848, 480))
     for picture_without, why in ((photograph, reasons.no_cane_with_depth()), (flat, reasons.no_cane_recognised())):
         result = find_cuts(picture_without, np.zeros_like(labels), PerceptionConfig())
-        assert not result.cuts and result.undecided == (why,)
+        assert not result.cuts and result.undecided == (Undecided(why),)
+
+
+def test_canes_at_the_cordon_without_a_spur_are_told_with_their_places(picture):
+    """As of a network that knows wood, but neither spurs nor nodes."""
+    photograph, labels, _ = picture
+    flat = Photograph(photograph.color, None, photograph.intrinsics, True, (848, 480))
+    spurs = find_cuts(flat, labels, PerceptionConfig()).spurs
+    plain = np.where(np.isin(labels, (SPUR, NODE)), CANE, labels).astype(np.uint8)
+    result = find_cuts(flat, plain, PerceptionConfig())
+    bases = np.array([each.pixel for each in result.undecided if each.reason == reasons.cane_without_spur()])
+    assert not result.cuts and spurs / 2 <= len(bases) <= 2 * spurs
+    old = distance_transform_edt(~np.isin(labels, (TRUNK, CORDON)))
+    assert all(old[round(v), round(u)] < 40.0 for u, v in bases)
+
+
+def test_specks_do_not_decide_how_wide_canes_are():
+    labels = np.zeros((200, 200), np.uint8)
+    labels[:, 95:105] = CANE
+    labels[::4, :80:4] = CANE
+    assert 8.0 <= cane_width(labels) <= 11.0
 
 
 def test_depth_that_is_nowhere_on_wood_gives_no_point(picture):
     photograph, labels, _ = picture
     blind = Photograph(photograph.color, np.zeros_like(photograph.depth), photograph.intrinsics, False, (848, 480))
     result = find_cuts(blind, labels, PerceptionConfig())
-    assert not result.cuts and result.undecided == (reasons.no_cane_with_depth(),)
+    assert not result.cuts and result.undecided == (Undecided(reasons.no_cane_with_depth()),)
 
 
 def test_every_point_has_its_reason_and_a_direction_along_the_wood(picture):
