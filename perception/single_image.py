@@ -29,6 +29,8 @@ from rolling_panda.messages.types import Reason
 FIRST_WIDTH, _MAX_WIDTH, _MIN_SIZE = 848, 1920, 64
 #: Median width of canes up to which a larger image shows more (px).
 _WIDE_CANE = 12.0
+#: Without depth, canes narrower than this are enlarged to the second width (px), and a photograph at most so often.
+_NARROW_CANE, _ENLARGED_CANE, _ENLARGE = 4.0, 6.0, 2.0
 #: Horizontal field of view without intrinsics (degrees): the colour camera of a RealSense D435i.
 _DEFAULT_FIELD_OF_VIEW = 69.0
 #: Plausible median depth (m).
@@ -69,13 +71,14 @@ class Photograph:
     size: tuple[int, int]
 
     def scaled(self, width: int) -> "Photograph":
-        """The photograph scaled down to a width (px); itself where it is not wider."""
+        """The photograph scaled to a width (px)."""
         own_height, own_width = self.color.shape[:2]
-        if own_width <= width:
+        if own_width == width:
             return self
         scale = width / own_width
         height = round(own_height * scale)
-        color = np.asarray(Image.fromarray(self.color).resize((width, height), Image.Resampling.BOX))
+        filtered = Image.Resampling.BOX if scale < 1.0 else Image.Resampling.BICUBIC
+        color = np.asarray(Image.fromarray(self.color).resize((width, height), filtered))
         depth = self.depth
         if depth is not None:
             # Nearest neighbour: a mean of foreground and background depth is meaningless.
@@ -130,6 +133,8 @@ def segment_photograph(
 ) -> tuple[Photograph, tuple[Labels, NDArray[np.float32] | None]]:
     """Segment a photograph at the scale that suits its canes: the largest at which they are not wide.
 
+    A photograph without depth is enlarged where its canes are narrow.
+
     Args:
         photograph: As `load_photograph` gives it.
         segmenter: The network.
@@ -140,10 +145,11 @@ def segment_photograph(
     Raises:
         InputError: The image is blank.
     """
-    scaled = photograph.scaled(FIRST_WIDTH)
+    own = photograph.color.shape[1]
+    scaled = photograph.scaled(min(own, FIRST_WIDTH))
     found = segmenter.classify_surely(scaled.color, scaled.depth)
-    wanted = _wide_enough(found[0])
-    if wanted <= FIRST_WIDTH or scaled is photograph:
+    wanted = _suitable_width(own, found[0], enlarge=photograph.depth is None)
+    if wanted == scaled.color.shape[1]:
         return scaled, found
     scaled = photograph.scaled(wanted)
     return scaled, segmenter.classify_surely(scaled.color, scaled.depth)
@@ -156,18 +162,22 @@ def photograph_width(own: int, labels: Labels) -> int:
         own: Width of the photograph (px).
         labels: H×W, at any scale.
     """
-    if own <= FIRST_WIDTH:
-        return own
-    first = Image.fromarray(labels).resize(
-        (FIRST_WIDTH, max(1, round(labels.shape[0] * FIRST_WIDTH / labels.shape[1]))), Image.Resampling.NEAREST
-    )
-    return min(own, max(FIRST_WIDTH, _wide_enough(np.asarray(first))))
+    width = min(own, FIRST_WIDTH)
+    height = max(1, round(labels.shape[0] * width / labels.shape[1]))
+    first = Image.fromarray(labels).resize((width, height), Image.Resampling.NEAREST)
+    return _suitable_width(own, np.asarray(first), enlarge=True)
 
 
-def _wide_enough(labels: Labels) -> int:
-    """The greatest width (px) at which canes are not too wide, from classes at the first width."""
+def _suitable_width(own: int, labels: Labels, enlarge: bool) -> int:
+    """Width (px) at which canes are neither wide nor narrow, from classes at the first width."""
+    first: int = labels.shape[1]
     width = cane_width(labels)
-    return _MAX_WIDTH if width is None else min(_MAX_WIDTH, int(FIRST_WIDTH * _WIDE_CANE / width))
+    own_width = 0.0 if width is None else width * own / first
+    if enlarge and own_width < _NARROW_CANE:
+        wanted = own * _ENLARGED_CANE / max(own_width, 1.0)
+        return int(min(_MAX_WIDTH, _ENLARGE * own, wanted))
+    wanted = _MAX_WIDTH if width is None else int(first * _WIDE_CANE / width)
+    return min(own, max(first, min(_MAX_WIDTH, wanted)))
 
 
 def cane_width(labels: Labels) -> float | None:
