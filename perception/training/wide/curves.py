@@ -202,6 +202,24 @@ def _rough(rng: np.random.Generator, radius: Floats, amount: float) -> Floats:
     return out
 
 
+def _add_old_wood(
+    rng: np.random.Generator, tubes: Tubes, axis: Floats, radii: Floats, kind: int, bark: Floats, rough: float
+) -> None:
+    """Append a trunk: round, or of strands that wind around each other, as where bark splits and peels."""
+    tubes.add(axis, radii, kind, bark, BARK, rough)
+    count = int(rng.choice([0, rng.integers(4, 10)]))
+    twist = rng.normal(0.0, 4.0)
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(axis, axis=0), axis=1))])
+    for strand in range(count):
+        angle = 2 * np.pi * strand / count + twist * length + np.cumsum(rng.normal(0.0, 0.12, len(axis)))
+        out = radii * rng.uniform(0.6, 0.95)
+        curve = axis + np.column_stack([np.cos(angle) * out, np.zeros(len(axis)), np.sin(angle) * out])
+        first = int(rng.integers(0, max(1, len(axis) // 3)))
+        last = max(first + 2, len(axis) - int(rng.integers(0, max(1, len(axis) // 3))))
+        width = _rough(rng, radii * rng.uniform(0.2, 0.5), 0.15)
+        tubes.add(curve[first:last], width[first:last], kind, _tinted(rng, bark, 0.35), BARK, rough)
+
+
 def grow_vine(rng: np.random.Generator, tubes: Tubes, wood: Wood, x: float, z: float, height: float, own: bool) -> None:
     """Append one vine, trained in one of several ways.
 
@@ -229,21 +247,21 @@ def grow_vine(rng: np.random.Generator, tubes: Tubes, wood: Wood, x: float, z: f
         )
         return out / np.linalg.norm(out)
 
-    thick = float(rng.uniform(0.012, 0.04))
-    base = np.array([x + rng.normal(0.0, 0.08), -0.02, z + rng.normal(0.0, 0.05)])
+    thick = float(rng.choice([rng.uniform(0.012, 0.04), rng.uniform(0.03, 0.065)], p=[0.6, 0.4]))
+    base = np.array([x + rng.normal(0.0, rng.choice([0.08, 0.3], p=[0.7, 0.3])), -0.02, z + rng.normal(0.0, 0.05)])
     head = np.array([x, height - rng.uniform(0.02, 0.12), z])
     t = np.linspace(0.0, 1.0, max(5, int(height / 0.03)))[:, None]
     trunk = base + (head - base) * t + np.cumsum(rng.normal(0.0, 0.006, (len(t), 3)), axis=0) * (1.0 - t)
     bark = _tinted(rng, wood.bark, 0.15)
-    rough = float(rng.uniform(0.2, 0.6))
+    rough = float(rng.uniform(0.2, 0.9))
     radii = _rough(
         rng, thick * np.interp(t[:, 0], [0.0, 0.15, 0.85, 1.0], [1.3, 1.0, 0.9, rng.uniform(0.9, 1.6)]), 0.10
     )
-    tubes.add(trunk, radii, kind(TRUNK), bark, BARK, rough)
+    _add_old_wood(rng, tubes, trunk, radii, kind(TRUNK), bark, rough)
     # Old heads are lumps of many years' cuts.
-    for _ in range(int(rng.integers(0, 5))):
+    for _ in range(int(rng.integers(0, 8))):
         lump = trunk[-1] + rng.normal(0.0, 0.6 * thick, (2, 3))
-        tubes.add(lump, thick * rng.uniform(0.6, 1.3, 2), kind(TRUNK), _tinted(rng, bark, 0.1), BARK, rough)
+        tubes.add(lump, thick * rng.uniform(0.5, 1.3, 2), kind(TRUNK), _tinted(rng, bark, 0.25), BARK, rough)
     system = rng.choice(["cordon", "guyot", "head"], p=[0.65, 0.2, 0.15])
     for side in (-1.0, 1.0) if rng.random() < 0.7 else (float(rng.choice([-1.0, 1.0])),):
         if system == "head":

@@ -365,10 +365,16 @@ class Artist:
         place = metres * 900.0
         grain = self._noise[0][_wrap(place + 37.0 * of), _wrap(s * 20.0 + 61.0 * of)]
         strips = self._bark[_wrap(s * 40.0 + 17.0 * of), _wrap(place * 0.5)]
+        # On what is thicker than long, across and along are those of its round end: rings. The picture's plane has none.
+        y, x = np.nonzero(hit)
+        across, down = (x * dy - y * dx) / size, (x * dx + y * dy) / size
+        stubby = long[n] < 2.0 * ends[n, 3]
+        strips = np.where(stubby, self._bark[_wrap(across * 1.3 + 17.0 * of), _wrap(down * 0.2)], strips)
+        grain = np.where(stubby, self._noise[0][_wrap(x + 37.0 * of), _wrap(y * 1.0)], grain)
         wooden = surface[of] == BARK
         texture = np.where(wooden, 0.7 * strips + 0.5 * grain, grain)
         bright = light * np.exp(rough[of] * np.clip(texture, -2.5, 2.5))
-        patches = self._noise[1][_wrap(place * 0.25 + 211.0 * of), _wrap(of * 7.0)]
+        patches = self._noise[1][_wrap(np.where(stubby, x * 0.5, place * 0.25) + 211.0 * of), _wrap(of * 7.0)]
         # Shadows of other canes cross; bark peels and lichen grows in patches.
         shadow = rng.uniform(0.0, 1.0) < 0.6
         if shadow:
