@@ -207,7 +207,7 @@ def _add_old_wood(
 ) -> None:
     """Append a trunk: round, or of strands that wind around each other, as where bark splits and peels."""
     tubes.add(axis, radii, kind, bark, BARK, rough)
-    count = int(rng.choice([0, rng.integers(4, 10)]))
+    count = int(rng.choice([0, int(rng.integers(4, 10))]))
     twist = rng.normal(0.0, 4.0)
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(axis, axis=0), axis=1))])
     for strand in range(count):

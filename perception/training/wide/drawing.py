@@ -365,7 +365,7 @@ class Artist:
         place = metres * 900.0
         grain = self._noise[0][_wrap(place + 37.0 * of), _wrap(s * 20.0 + 61.0 * of)]
         strips = self._bark[_wrap(s * 40.0 + 17.0 * of), _wrap(place * 0.5)]
-        # On what is thicker than long, across and along are those of its round end: rings. The picture's plane has none.
+        # Across and along what is thicker than long are rings around its end; the picture's own plane has none.
         y, x = np.nonzero(hit)
         across, down = (x * dy - y * dx) / size, (x * dx + y * dy) / size
         stubby = long[n] < 2.0 * ends[n, 3]
