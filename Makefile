@@ -29,7 +29,8 @@ demo: $(VENV)/.project
 # First the tests that others may run beside, one more at once than there are cores, since a browser's test waits as much as
 # it computes; then those that keep real time, two at once; then those that anything beside them would disturb. Training
 # has its own target, since nothing else needs PyTorch.
-TRAINING_TESTS := tests/perception/test_training.py tests/perception/test_wide_training.py tests/perception/test_tune.py
+TRAINING_TESTS := tests/perception/test_training.py tests/perception/test_wide_training.py tests/perception/test_tune.py \
+	tests/perception/test_familiarity.py
 WITHOUT_TRAINING := $(TRAINING_TESTS:%=--ignore %)
 test: check browser systemd drivers
 ifdef ARGS

@@ -22,6 +22,10 @@ BENCHMARKS = {
     "live": ("benchmarks.control.live", "the running demo: control periods on time, round trip, tool error"),
     "perception": ("benchmarks.perception.survey", "surveys of unseen rows, every pruning point judged"),
     "photographs": ("benchmarks.perception.photographs", "classes of photographs, against masks that people drew"),
+    "familiarity": (
+        "benchmarks.perception.familiarity",
+        "whether pictures unlike those of the training are told apart",
+    ),
     "obstacles": ("benchmarks.perception.obstacles", "what stands in the way after ten minutes, against the truth"),
     "real": ("benchmarks.faults.real", "random commands and faults, the real bridge on fakes with monitors"),
     "faults": ("benchmarks.faults.run", "random faults in motion, judged by what the actuators were sent"),

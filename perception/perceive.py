@@ -25,6 +25,7 @@ from perception.single_image import (
     ImageCut,
     ImageResult,
     Photograph,
+    Undecided,
     find_cuts,
     load_photograph,
     segment_photograph,
@@ -74,6 +75,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         photograph, (labels, _) = segment_photograph(whole, segmenter)
         config = with_width_bias(replace(PerceptionConfig(), rule=rule), segmenter.width_bias)
         result = find_cuts(photograph, labels, config)
+        if segmenter.unfamiliar is not None:
+            result = ImageResult((), (Undecided(segmenter.unfamiliar),), result.spurs, result.canes, result.scale)
         arguments.out.mkdir(parents=True, exist_ok=True)
         _write(arguments.out, arguments.image, photograph, labels, result, segmenter.name)
         scale = photograph.size[0] / labels.shape[1]

@@ -134,6 +134,9 @@ class Perception:
         cylinders = self._obstacle_map.update(view, labels)
         self._frames += 1
         if self._is_survey(view, labels):
+            if self.segmenter.unfamiliar is not None:
+                self._site_messages = (undecided_site(self.segmenter.unfamiliar),)
+                return replace(self.points(), canes=())
             self._survey(view, labels, cylinders)
         else:
             # Too near or too far to read whole spurs, but it may show that wood is gone.

@@ -1947,6 +1947,11 @@ def picture_blank(brightest: float) -> None:
     """The colour image is blank: its brightest value is {brightest:.0f} of 255."""
 
 
+@_reason("warning", "see what is before the camera; decide yourself where to cut, or train on such pictures")
+def picture_unfamiliar(strangeness: float, limit: float) -> None:
+    """Unfamiliar picture: it is unlike all that the network was trained on ({strangeness:.2f}, limit {limit:.2f})."""
+
+
 @_reason("warning", "choose the segmenter network")
 def frame_without_labels(segmenter: str) -> None:
     """The frame has no label image for {segmenter}; only the simulated camera sends one."""

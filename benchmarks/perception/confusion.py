@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from perception.segmentation.frame import View
 from perception.segmentation.segmenter import Segmenter
-from rolling_panda.messages.types import WOOD_CLASSES
+from rolling_panda.messages.types import WOOD_CLASSES, Reason
 
 #: One line of pixels in so many is counted, which costs a frame less than a millisecond.
 _EVERY = 4
@@ -32,6 +32,11 @@ class Confusion:
     def width_bias(self) -> float:
         """As the segmenter's."""
         return self._segmenter.width_bias
+
+    @property
+    def unfamiliar(self) -> Reason | None:
+        """As the segmenter's."""
+        return self._segmenter.unfamiliar
 
     def segment(self, view: View) -> NDArray[np.uint8]:
         """As the segmenter's."""

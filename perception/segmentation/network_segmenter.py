@@ -13,8 +13,10 @@ from perception.arrays import Labels
 from perception.segmentation.frame import UnusablePictureError, View
 from rolling_panda import reasons
 from rolling_panda.errors import ConfigError
-from rolling_panda.messages.types import WOOD_CLASSES
+from rolling_panda.messages.types import WOOD_CLASSES, Reason
 
+#: Output of how unlike the training pictures a picture is, and metadata up to which value it is familiar.
+STRANGENESS, FAMILIAR = "strangeness", "familiar"
 #: Input channels: red, green, blue, inverse depth.
 CHANNELS = 4
 #: Depths below this are invalid (m).
@@ -58,7 +60,12 @@ class NetworkSegmenter:
     """Runs an ONNX file: `image` 1×4×H×W (see `network_input`) to `classes` 1×H×W, uint8.
 
     Its metadata has `classes`, a JSON list equal to `WOOD_CLASSES`, and optionally `widening`, the width bias (px), and
-    `multiple`, which image sides must be a multiple of (px). A second output, `confidence`, is optional.
+    `multiple`, which image sides must be a multiple of (px). The output `confidence` is optional, and so is
+    `strangeness` (1), with the metadata `familiar`: pictures above it are unlike those of the training.
+
+    Attributes:
+        familiar: Strangeness up to which a picture is familiar; None if the network does not tell it.
+        strangeness: Of the last picture; None if the network does not tell it.
     """
 
     def __init__(self, path: Path, threads: int = 2) -> None:
@@ -89,9 +96,18 @@ class NetworkSegmenter:
         self.name = f"network {path.name} {hashlib.sha256(content).hexdigest()[:12]}"
         self.width_bias = _width_bias(self._session, path)
         self._multiple = _multiple(self._session, path)
-        self._outputs = [
-            output.name for output in self._session.get_outputs() if output.name in ("classes", "confidence")
-        ]
+        self.familiar = _familiar(self._session, path)
+        self.strangeness: float | None = None
+        has = {output.name for output in self._session.get_outputs()}
+        self._always = ["classes"] + [STRANGENESS] * (self.familiar is not None)
+        self._outputs = [*self._always, *(["confidence"] if "confidence" in has else [])]
+
+    @property
+    def unfamiliar(self) -> Reason | None:
+        """Why the last picture is unlike those of the training; None if it is not, or nobody knows."""
+        if self.familiar is None or self.strangeness is None or self.strangeness <= self.familiar:
+            return None
+        return reasons.picture_unfamiliar(self.strangeness, self.familiar)
 
     def segment(self, view: View) -> Labels:
         """Classes by colour and depth.
@@ -108,7 +124,7 @@ class NetworkSegmenter:
         Raises:
             UnusablePictureError: The colour image is blank.
         """
-        return self.classify_surely(color, depth, ["classes"])[0]
+        return self.classify_surely(color, depth, self._always)[0]
 
     def classify_surely(
         self, color: NDArray[np.uint8], depth: NDArray[np.float32] | None, outputs: list[str] | None = None
@@ -127,6 +143,7 @@ class NetworkSegmenter:
             image = np.pad(image, ((0, 0), (0, below), (0, right)), mode="edge")
         names = outputs or self._outputs
         told = dict(zip(names, self._session.run(names, {"image": image[None]}, self._run_options), strict=True))
+        self.strangeness = float(told[STRANGENESS][0]) if STRANGENESS in told else None
         classes: Labels = np.ascontiguousarray(told["classes"][0, :height, :width])
         if "confidence" not in told:
             return classes, None
@@ -145,6 +162,20 @@ def _width_bias(session: onnxruntime.InferenceSession, path: Path) -> float:
     if not abs(value) <= _MAX_WIDTH_BIAS:
         raise ConfigError(f"{path}: metadata 'widening' is {text!r}; give a number of pixels up to {_MAX_WIDTH_BIAS:g}")
     return value
+
+
+def _familiar(session: onnxruntime.InferenceSession, path: Path) -> float | None:
+    text = session.get_modelmeta().custom_metadata_map.get(FAMILIAR)
+    if text is None:
+        return None
+    try:
+        limit = float(text)
+    except ValueError:
+        limit = 0.0
+    has = any(output.name == STRANGENESS for output in session.get_outputs())
+    if not (has and 0.0 < limit < 1e6):
+        raise ConfigError(f"{path}: metadata {FAMILIAR!r} is {text!r}; a number above 0 and {STRANGENESS!r} are wanted")
+    return limit
 
 
 def _multiple(session: onnxruntime.InferenceSession, path: Path) -> int:

@@ -27,6 +27,10 @@ class Segmenter(Protocol):
     def width_bias(self) -> float:
         """By how much it draws canes too wide, on average (px)."""
 
+    @property
+    def unfamiliar(self) -> Reason | None:
+        """Why the last frame is unlike all that it was trained on; None if it is not, or nobody knows."""
+
     def segment(self, view: View) -> Labels:
         """H×W indices into `WOOD_CLASSES`.
 
@@ -40,6 +44,7 @@ class LabelImageSegmenter:
 
     name = "simulator labels"
     width_bias = 0.0
+    unfamiliar: Reason | None = None
 
     def segment(self, view: View) -> Labels:
         """The frame's own label image.
@@ -57,6 +62,7 @@ class NoSegmenter:
 
     name = "none"
     width_bias = 0.0
+    unfamiliar: Reason | None = None
 
     def __init__(self, reason: Reason) -> None:
         """Store the reason given for every frame."""

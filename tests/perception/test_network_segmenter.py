@@ -98,6 +98,8 @@ def test_a_frame_without_a_picture_is_refused(tmp_path):
         (onnx_by_hand.brightest_channel(CLASSES, widening="much"), "'widening' is 'much'"),
         (onnx_by_hand.brightest_channel(CLASSES, widening="nan"), "'widening' is"),
         (onnx_by_hand.brightest_channel(CLASSES, widening="40"), "'widening' is"),
+        (onnx_by_hand.brightest_channel(CLASSES, familiar="1.2"), "'familiar' is '1.2'"),
+        (onnx_by_hand.brightest_channel(CLASSES, familiar="nan"), "'familiar' is"),
         (onnx_by_hand.brightest_channel(CLASSES, multiple="12"), "'multiple' is '12'"),
     ],
 )

@@ -5,6 +5,7 @@ import subprocess
 
 import numpy as np
 import pytest
+import skimage.data
 from PIL import Image
 
 from bridge.sim.camera.config import CameraConfig
@@ -90,6 +91,13 @@ def test_a_picture_of_noise_gives_no_point(tmp_path):
     Image.fromarray(noise).save(tmp_path / "vine.jpg")
     said = run(tmp_path, tmp_path / "out")
     assert said["points"] == [] and said["undecided"]
+
+
+def test_a_picture_of_something_else_is_called_unfamiliar(tmp_path):
+    Image.fromarray(skimage.data.chelsea()).save(tmp_path / "vine.jpg")
+    said = run(tmp_path, tmp_path / "out")
+    (only,) = said["undecided"]
+    assert said["points"] == [] and only["reason"].startswith("Unfamiliar picture") and only["pixel"] is None
 
 
 @pytest.mark.parametrize(

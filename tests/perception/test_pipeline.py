@@ -76,6 +76,19 @@ def test_without_labels_a_site_stays_undecided_with_the_reason(model, frames):
     assert result.undecided_sites[0].reason.code == "frame_without_labels"
 
 
+def test_an_unfamiliar_picture_gives_no_point_and_says_so(model, frames):
+    segmenter = LabelImageSegmenter()
+    seen = Perception(PerceptionConfig(), segmenter, model)
+    segmenter.unfamiliar = reasons.picture_unfamiliar(2.4, 1.2)
+    for frame in frames:
+        result = seen.process(frame)
+    assert not result.points and [site.reason for site in result.undecided_sites] == [segmenter.unfamiliar]
+    segmenter.unfamiliar = None
+    for frame in frames:
+        result = seen.process(frame)
+    assert result.points and all(site.reason.code != "picture_unfamiliar" for site in result.undecided_sites)
+
+
 def test_what_cannot_be_a_post_is_told_with_its_count(model, frames):
     seen = perception(model)
     for frame in frames:

@@ -32,6 +32,7 @@ def brightest_channel(
     kind: str = "uint8",
     widening: str | None = None,
     multiple: str | None = None,
+    familiar: str | None = None,
 ) -> bytes:
     """A model whose class of a pixel is the number of its largest channel.
 
@@ -42,6 +43,7 @@ def brightest_channel(
         kind: uint8 or int64.
         widening: Written into the metadata.
         multiple: Written into the metadata.
+        familiar: Written into the metadata.
     """
     argmax = (
         _bytes(1, "image")
@@ -69,6 +71,7 @@ def brightest_channel(
         model += _bytes(14, _bytes(1, "classes") + _bytes(2, json.dumps(classes)))
     if widening is not None:
         model += _bytes(14, _bytes(1, "widening") + _bytes(2, widening))
-    if multiple is not None:
-        model += _bytes(14, _bytes(1, "multiple") + _bytes(2, multiple))
+    for key, text in (("multiple", multiple), ("familiar", familiar)):
+        if text is not None:
+            model += _bytes(14, _bytes(1, key) + _bytes(2, text))
     return model

@@ -27,6 +27,7 @@ from perception.models.judge import DECISIVE, Figures, judge_held_out
 from perception.segmentation.frame import BACKGROUND, GROUND
 from perception.segmentation.network_segmenter import NetworkSegmenter, network_input
 from perception.single_image import photograph_width
+from perception.training.familiarity import add_familiarity
 from perception.training.wide.drawing import FAR, Artist, Drawing
 from perception.training.wide.export import MULTIPLE, Answer, prior, write_onnx
 from perception.training.wide.fit import keep, weighted_loss
@@ -38,6 +39,8 @@ from rolling_panda.messages.types import WOOD_CLASSES
 IMAGENET = "imagenet"
 #: Parts of one's own pictures in a batch; one drawn picture is added, so that what was learned before is kept.
 _OWN = 3
+#: Pictures by which a network tells what is familiar.
+_SHOWN = 400
 #: Rates of decoder and encoder, and the range of sizes at which pictures are shown.
 _RATE, _ENCODER_RATE, _SCALES = 1e-3, 2e-4, (0.6, 1.15)
 #: Steps between judgements, and judgements without a better one after which training ends.
@@ -146,6 +149,7 @@ def _write(path: Path, tuner: "Tuner", datasets: Sequence[Dataset]) -> dict[str,
     path.parent.mkdir(parents=True, exist_ok=True)
     new = path.with_suffix(".new.onnx")
     write_onnx(new, network, temperature)
+    add_familiarity(new, tuner.shown(_SHOWN))
     new.replace(path)
     segmenter = NetworkSegmenter(path)
     return {f"{d.folder.name}, {len(d.names('held-out'))} held out": judge_held_out(segmenter, d) for d in datasets}
@@ -225,6 +229,12 @@ class Tuner:
         out: PhotographNetwork = copy.deepcopy(self._network)
         out.load_state_dict(self._best)
         return out, max(self.curve, key=lambda each: each.f).temperature
+
+    def shown(self, count: int) -> list[NDArray[np.float32]]:
+        """Inputs of the network (each 4×size×size): parts of the own pictures and drawings by turns."""
+        rng = np.random.default_rng([self._seed, count])
+        parts = [self._artist.draw(self._seed, k, 1) if k % 2 else self._part(rng) for k in range(count)]
+        return [network_input(each.color, each.depth) for each in parts]
 
     def state(self) -> dict[str, object]:
         """Everything that `restore` needs."""
