@@ -110,6 +110,7 @@ class PerceptionProcess:
         self._crop_cycle: dict[tuple[str, int], PointCrop] = {}
         """Crops in the order of their repetition, the next one first."""
         self._camera_rays = perception.camera_rays
+        self._familiarity_unknown = perception.familiarity_unknown
         self._frame: Received[CameraFrame] | None = None
         self._submitted: Received[CameraFrame] | None = None
         self._sequence = 0
@@ -127,6 +128,8 @@ class PerceptionProcess:
         if not self._started:
             self._started = True
             self._log(reasons.perception_started(), now)
+            if self._familiarity_unknown:
+                self._log(reasons.familiarity_unknown(), now)
         while self._checks:
             self._out.append(self._checks.popleft())
         done = self._worker.poll()

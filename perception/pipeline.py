@@ -20,6 +20,7 @@ from perception.rules.keep_out import frame_keep_out, map_keep_out
 from perception.rules.manual import move_cut, place_cut
 from perception.rules.pruning import Decision, apply_rule
 from perception.segmentation.frame import CORDON, UnusablePictureError, View, decode_frame
+from perception.segmentation.network_segmenter import NetworkSegmenter
 from perception.segmentation.segmenter import Segmenter
 from perception.skeleton.topology import perceive_plant
 from perception.tracking.camera_rays import CameraRays, Ray
@@ -51,6 +52,8 @@ _MIN_NORM = 1e-6
 _MIN_CORDON = 200
 #: A spur within this distance of the image centre, along the row, is in front of the camera (m).
 _IN_FRONT = 0.3
+#: Successive unfamiliar frames after which the page says so: a single one would make the list of open places flicker.
+_UNFAMILIAR_FRAMES = 2
 #: Rule changes that can be undone.
 _MAX_UNDO = 20
 #: A position nearer than this to a cut that was made has been cut (m).
@@ -93,6 +96,8 @@ class Perception:
         self._tracker = Tracker(config.tracker)
         self._numbering = SpurNumbering(config.tracker.spur_separation, config.tracker.vine_spacing)
         self._frames = 0
+        self._unfamiliar_frames = 0
+        """Unfamiliar frames in succession, up to now."""
         self._stamp = 0.0
         self._undecided = UndecidedSites()
         self._site_messages: tuple[m.UndecidedSite, ...] = ()
@@ -131,12 +136,12 @@ class Perception:
         except UnusablePictureError as error:
             self._site_messages = (undecided_site(error.reason),)
             return replace(self.points(), canes=())
-        cylinders = self._obstacle_map.update(view, labels)
         self._frames += 1
+        if (unfamiliar := self.segmenter.unfamiliar) is not None:
+            return self._process_unfamiliar(view, labels, unfamiliar)
+        self._unfamiliar_frames = 0
+        cylinders = self._obstacle_map.update(view, labels)
         if self._is_survey(view, labels):
-            if self.segmenter.unfamiliar is not None:
-                self._site_messages = (undecided_site(self.segmenter.unfamiliar),)
-                return replace(self.points(), canes=())
             self._survey(view, labels, cylinders)
         else:
             # Too near or too far to read whole spurs, but it may show that wood is gone.
@@ -146,6 +151,18 @@ class Perception:
             if self.plant_map.spurs:
                 self._site_messages = self._undecided_sites()
         return self.points()
+
+    def _process_unfamiliar(self, view: View, labels: Labels, reason: m.Reason) -> m.PruningPoints:
+        """Points after a frame whose classes are doubtful: it adds obstacles, and removes and proposes nothing."""
+        cylinders = self._obstacle_map.update(view, labels, only_add=True)
+        canes = tuple(capsule for capsule in self.obstacles if capsule.kind == "cane")
+        obstacles = (cylinders + canes)[: self._config.obstacles.max_capsules]
+        self.obstacles = self.obstacles if obstacles == self.obstacles else obstacles
+        self._unfamiliar_frames += 1
+        if self._unfamiliar_frames < _UNFAMILIAR_FRAMES:
+            return self.points()
+        self._site_messages = (undecided_site(reason),)
+        return replace(self.points(), canes=())
 
     def _survey(self, view: View, labels: Labels, cylinders: tuple[Capsule, ...]) -> None:
         """Update plant map, points and obstacles from a survey frame."""
@@ -224,6 +241,11 @@ class Perception:
             canes=self._cane_lines,
             rule=_rule_message(self._config.rule),
         )
+
+    @property
+    def familiarity_unknown(self) -> bool:
+        """Whether unfamiliar pictures go unnoticed, since the network does not tell them."""
+        return isinstance(self.segmenter, NetworkSegmenter) and self.segmenter.familiar is None
 
     @property
     def rejected_wood(self) -> tuple[m.Reason, ...]:

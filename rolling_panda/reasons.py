@@ -1857,6 +1857,11 @@ def perception_started() -> None:
     """Perception is up and waits for camera frames."""
 
 
+@_reason("warning", "check the points yourself, or use a network that tells unfamiliar pictures")
+def familiarity_unknown() -> None:
+    """Familiarity unknown: the network in use does not tell pictures that are unlike those of its training."""
+
+
 @_reason("info", "")
 def new_point(points: float) -> None:
     """One new pruning point, {points:.0f} in all."""

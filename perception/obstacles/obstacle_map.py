@@ -44,12 +44,13 @@ class ObstacleMap:
         self.rejected: Counter[tuple[WoodClass, Rejection]] = Counter()
         """Implausible wood by class and reason, as of the last frame."""
 
-    def update(self, view: View, labels: Labels) -> tuple[Capsule, ...]:
+    def update(self, view: View, labels: Labels, only_add: bool = False) -> tuple[Capsule, ...]:
         """Add one frame; returns the map.
 
         Args:
             view: The frame.
             labels: H×W class indices.
+            only_add: Nothing is forgotten for this frame, whose classes are doubtful.
 
         Returns:
             Capsules in odom (m), the nearest where they are too many.
@@ -57,7 +58,7 @@ class ObstacleMap:
         config = self._config
         for kind, grid in self._grids.items():
             min_depth = config.min_depth if kind == "wire" else config.min_depth_thick
-            grid.update(view, labels, min_depth, config.max_depth, config.max_points)
+            grid.update(view, labels, min_depth, config.max_depth, config.max_points, only_add)
         occupied = {kind: grid.occupied() for kind, grid in self._grids.items()}
         plane = row_plane(occupied)
         self.rejected.clear()

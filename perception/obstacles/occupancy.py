@@ -83,7 +83,9 @@ class OccupancyGrid:
         """Number of cells."""
         return len(self._key)
 
-    def update(self, view: View, labels: Labels, min_depth: float, max_depth: float, max_points: int) -> None:
+    def update(
+        self, view: View, labels: Labels, min_depth: float, max_depth: float, max_points: int, only_add: bool = False
+    ) -> None:
         """Add one frame.
 
         Args:
@@ -92,6 +94,7 @@ class OccupancyGrid:
             min_depth: Nearer pixels make no hit, but their rays still make misses (m).
             max_depth: The same for farther pixels (m).
             max_points: Approximate number of pixels used.
+            only_add: No misses: a frame whose classes are doubtful forgets nothing.
         """
         rows, cols = class_pixels(labels, (self._class,))
         depth = view.depth[rows, cols]
@@ -100,7 +103,8 @@ class OccupancyGrid:
         rows, cols = rows[used], cols[used]
         inner = self._off_edges(view.depth, labels, rows, cols)
         hit = self._add_hits(view, rows[inner], cols[inner])
-        self._add_misses(view, labels, hit, min_depth, max_depth)
+        if not only_add:
+            self._add_misses(view, labels, hit, min_depth, max_depth)
         self._occupied = np.where(self._occupied, self._odds >= _HIT, self._odds >= self._threshold)
         self._prune(view.t)
 

@@ -52,6 +52,7 @@ class FakePerception:
     withdrawn = ()
     crops = ()
     rejected_wood = ()
+    familiarity_unknown = False
     obstacles = (Capsule("wire", (0.0, 0.75, 1.2), (2.0, 0.75, 1.2), 0.004, 0.004),)
 
     def __init__(self):

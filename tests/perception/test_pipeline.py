@@ -1,3 +1,4 @@
+import io
 import zlib
 
 import msgspec
@@ -5,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from PIL import Image, ImageFilter
 
 from bridge.sim.camera.config import CameraConfig
 from bridge.sim.camera.frame import survey_frame
@@ -12,16 +14,20 @@ from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
 from perception.config import PerceptionConfig
+from perception.loop import PerceptionProcess
 from perception.pipeline import Perception, with_width_bias
 from perception.segmentation.frame import CORDON, POST, CorruptFrameError, decode_frame
-from perception.segmentation.segmenter import LabelImageSegmenter
+from perception.segmentation.segmenter import LabelImageSegmenter, choose_segmenter
 from perception.skeleton.topology import perceive_plant
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.commands import AddPoint, AddPointInImage, EvaluateRule, MovePoint, SetRule, UndoRule
 from rolling_panda.messages.perception import point_digest
+from rolling_panda.messages.types import WOOD_CLASSES
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.transport.codec import StrictDecoder, encode
+from rolling_panda.transport.inbox import Inbox
+from tests.support import onnx_by_hand
 
 pytestmark = pytest.mark.long
 
@@ -87,6 +93,84 @@ def test_an_unfamiliar_picture_gives_no_point_and_says_so(model, frames):
     for frame in frames:
         result = seen.process(frame)
     assert result.points and all(site.reason.code != "picture_unfamiliar" for site in result.undecided_sites)
+
+
+def cuts(result):
+    """What is cut and where, by name."""
+    return {point.point_id: (point.revision, point.position, point.digest) for point in result.points}
+
+
+def unlit(frame):
+    """The frame with all its wood taken for background, as by night; its depth stays."""
+    blank = bytes(frame.intrinsics.width * frame.intrinsics.height)
+    return msgspec.structs.replace(frame, labels_zlib=zlib.compress(blank))
+
+
+def test_unfamiliar_pictures_remove_neither_points_nor_obstacles(model, frames):
+    segmenter = LabelImageSegmenter()
+    seen = Perception(PerceptionConfig(), segmenter, model)
+    before = [seen.process(frame) for frame in frames][-1]
+    obstacles = seen.obstacles
+    segmenter.unfamiliar = reasons.picture_unfamiliar(2.4, 1.2)
+    for _ in range(8):
+        for frame in frames:
+            result = seen.process(unlit(frame))
+            assert not seen.withdrawn
+    assert result.points == before.points and seen.obstacles == obstacles
+    assert [site.reason.code for site in result.undecided_sites] == ["picture_unfamiliar"]
+    segmenter.unfamiliar = None
+    kinds = {capsule.kind for capsule in obstacles}
+    seen.process(frames[-1])
+    assert {capsule.kind for capsule in seen.obstacles} == kinds >= {"cordon", "wire"}
+
+
+def test_a_post_in_an_unfamiliar_picture_is_an_obstacle_all_the_same(model, frames):
+    segmenter = LabelImageSegmenter()
+    seen = Perception(PerceptionConfig(), segmenter, model)
+    segmenter.unfamiliar = reasons.picture_unfamiliar(2.4, 1.2)
+    for frame in frames:
+        seen.process(frame)
+    assert {capsule.kind for capsule in seen.obstacles} >= {"cordon", "wire"}
+
+
+def test_a_single_unfamiliar_picture_leaves_the_open_places_on_the_page(model, frames):
+    segmenter = LabelImageSegmenter()
+    seen = Perception(PerceptionConfig(), segmenter, model)
+    before = [seen.process(frame) for frame in frames][-1]
+    segmenter.unfamiliar = reasons.picture_unfamiliar(2.4, 1.2)
+    once = seen.process(frames[-1])
+    assert once.undecided_sites == before.undecided_sites and cuts(once) == cuts(before) and once.canes
+    twice = seen.process(frames[-1])
+    assert [site.reason for site in twice.undecided_sites] == [segmenter.unfamiliar]
+    segmenter.unfamiliar = None
+    seen.process(frames[-1])
+    segmenter.unfamiliar = reasons.picture_unfamiliar(2.4, 1.2)
+    assert all(site.reason != segmenter.unfamiliar for site in seen.process(frames[-1]).undecided_sites)
+
+
+def test_what_the_simulated_camera_sees_is_familiar_to_the_shipped_network_and_a_blurred_lens_is_not(model, frames):
+    seen = Perception(PerceptionConfig(), choose_segmenter("network"), model)
+    assert not seen.familiarity_unknown
+    for frame in frames:
+        result = seen.process(frame)
+    assert result.points and all(site.reason.code != "picture_unfamiliar" for site in result.undecided_sites)
+    for frame in frames[:2]:
+        with Image.open(io.BytesIO(frame.color_jpeg)) as image:
+            blurred = io.BytesIO()
+            image.filter(ImageFilter.GaussianBlur(8.0)).save(blurred, "JPEG")
+        later = seen.process(msgspec.structs.replace(frame, color_jpeg=blurred.getvalue()))
+    assert cuts(later) == cuts(result)
+    assert [site.reason.code for site in later.undecided_sites] == ["picture_unfamiliar"]
+
+
+def test_a_network_that_does_not_tell_unfamiliar_pictures_is_said_to(model, tmp_path):
+    path = tmp_path / "net.onnx"
+    path.write_bytes(onnx_by_hand.brightest_channel(list(WOOD_CLASSES)))
+    unknowing = Perception(PerceptionConfig(), choose_segmenter("network", path), model)
+    assert unknowing.familiarity_unknown and not perception(model).familiarity_unknown
+    sent = PerceptionProcess(PerceptionConfig(), unknowing).step(Inbox(), 0.0)
+    told = [message.reason.code for message in sent if isinstance(message, m.LogEvent)]
+    assert told == ["perception_started", "familiarity_unknown"]
 
 
 def test_what_cannot_be_a_post_is_told_with_its_count(model, frames):

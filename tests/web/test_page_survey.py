@@ -4,6 +4,8 @@ import msgspec
 import pytest
 from playwright.sync_api import Page, expect
 
+from rolling_panda import reasons
+from rolling_panda.reasons import text_of
 from tests.support.played_page import until
 from tests.support.played_server import PlayedServer, controller
 
@@ -38,3 +40,16 @@ def test_a_place_that_needs_another_look_has_a_button_for_it_and_one_for_a_perso
     assert server.posted == [("/api/look-again", {"vine": 1, "spur": 3})]
     server.controller = controller("AUTO", allowed={"Pause": None})
     expect(button).to_be_disabled()
+
+
+def test_an_unfamiliar_picture_is_told_to_the_operator(page: Page, server: PlayedServer) -> None:
+    (site, *_) = server.undecided_sites
+    reason = reasons.picture_unfamiliar(2.4, 1.2)
+    told = msgspec.structs.replace(site, reason=reason, needs="operator", vine=0, spur=0, position=None)
+    server.undecided_sites = (told,)
+    server.tell(server.page_points())
+    box = page.locator("details.undecided-sites[data-needs='operator']")
+    box.locator("summary").click()
+    expect(box.locator("li")).to_contain_text(text_of(reason))
+    expect(box.locator("li")).to_contain_text("decide yourself where to cut")
+    expect(page.locator("button.look-again")).to_have_count(0)
