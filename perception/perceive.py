@@ -18,8 +18,8 @@ from PIL import Image, ImageDraw
 from perception.arrays import Labels
 from perception.config import PerceptionConfig, RuleConfig
 from perception.pipeline import with_width_bias
-from perception.segmentation.network_segmenter import NetworkSegmenter
-from perception.segmentation.segmenter import SHIPPED
+from perception.segmentation.network_segmenter import PhotographSegmenter
+from perception.segmentation.segmenter import PHOTOGRAPHS, SHIPPED
 from perception.single_image import (
     R_LEVEL,
     ImageCut,
@@ -61,7 +61,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--depth", type=Path, metavar="FILE", help="16-bit PNG or .npy, as large as the image")
     parser.add_argument("--depth-unit", type=float, default=0.001, metavar="M", help="metres a count (default: 0.001)")
     parser.add_argument("--intrinsics", type=Path, metavar="FILE", help="JSON: width, height, fx, fy, cx, cy")
-    parser.add_argument("--weights", type=Path, metavar="FILE", help="your own network (default: the shipped one)")
+    parser.add_argument(
+        "--weights",
+        type=Path,
+        metavar="FILE",
+        help="network (default: the shipped one that the picture is familiar to)",
+    )
     parser.add_argument("--system", choices=("spur", "guyot"), default="spur", help="how the vine is trained")
     parser.add_argument("--nodes-kept", type=int, default=2, help="count nodes that stay on a spur (default: 2)")
     parser.add_argument("--offset", type=float, default=0.020, help="cut so far past the last one (m, default: 0.02)")
@@ -71,8 +76,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         if not arguments.depth_unit > 0.0:
             raise InputError(f"--depth-unit {arguments.depth_unit}: give the metres a count, more than 0")
         whole = load_photograph(arguments.image, arguments.depth, arguments.intrinsics, arguments.depth_unit)
-        segmenter = NetworkSegmenter(arguments.weights or resource(SHIPPED))
-        photograph, (labels, _) = segment_photograph(whole, segmenter)
+        paths = [arguments.weights] if arguments.weights else [resource(SHIPPED), resource(PHOTOGRAPHS)]
+        networks = PhotographSegmenter(*paths)
+        photograph, (labels, _) = segment_photograph(whole, networks)
+        segmenter = networks.used
         config = with_width_bias(replace(PerceptionConfig(), rule=rule), segmenter.width_bias)
         result = find_cuts(photograph, labels, config)
         if segmenter.unfamiliar is not None:

@@ -22,8 +22,8 @@ from perception.config import PerceptionConfig
 from perception.models.judge import SAME, TOGETHER, Agreement, compared, tell
 from perception.pipeline import with_width_bias
 from perception.segmentation.frame import CANE
-from perception.segmentation.network_segmenter import NetworkSegmenter
-from perception.segmentation.segmenter import SHIPPED
+from perception.segmentation.network_segmenter import PhotographSegmenter
+from perception.segmentation.segmenter import PHOTOGRAPHS, SHIPPED
 from perception.single_image import Photograph, find_cuts, load_photograph, segment_photograph
 from rolling_panda.errors import InputError
 from rolling_panda.resources import resource
@@ -58,7 +58,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         default="background,trunk,cane,cordon",
         help=f"names of the masks' values, from 0; compared are {', '.join(SAME)} (default: %(default)s)",
     )
-    parser.add_argument("--weights", type=Path, metavar="FILE", help="your own network (default: the shipped one)")
+    parser.add_argument("--weights", type=Path, metavar="FILE", help="your own network (default: as `perceive`)")
     parser.add_argument("--method", choices=("network", "ridge"), default="network", help="ridge: a filter, to beat")
     parser.add_argument("--tolerance", type=float, default=3.0, metavar="PX", help="(default: %(default)s)")
     parser.add_argument("--gallery", type=Path, metavar="FILE", help="write the photographs here, the worst first")
@@ -66,7 +66,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     if not 0.0 <= words.tolerance <= 100.0:
         raise InputError(f"--tolerance {words.tolerance}: give 0 to 100 pixels")
     classes = tuple(name.strip() for name in words.classes.split(","))
-    segmenter = None if words.method == "ridge" else NetworkSegmenter(words.weights or resource(SHIPPED))
+    paths = [words.weights] if words.weights else [resource(SHIPPED), resource(PHOTOGRAPHS)]
+    segmenter = None if words.method == "ridge" else PhotographSegmenter(*paths)
     method = ridge if segmenter is None else network(segmenter)
     totals = {name: Agreement() for name in (*SAME, *TOGETHER)}
     places = Places()
@@ -167,10 +168,10 @@ class Places:
     points: int = 0
     wrong: int = 0
 
-    def add(self, truth: dict[str, Mask], whole: Photograph, segmenter: NetworkSegmenter, tolerance: float) -> None:
+    def add(self, truth: dict[str, Mask], whole: Photograph, segmenter: PhotographSegmenter, tolerance: float) -> None:
         """Count one photograph."""
         photograph, (labels, _) = segment_photograph(whole, segmenter)
-        result = find_cuts(photograph, labels, with_width_bias(PerceptionConfig(), segmenter.width_bias))
+        result = find_cuts(photograph, labels, with_width_bias(PerceptionConfig(), segmenter.used.width_bias))
         scale = whole.size[0] / labels.shape[1]
         located = [cut.pixel for cut in result.cuts]
         located += [each.pixel for each in result.undecided if each.pixel is not None]
@@ -207,7 +208,7 @@ def bases(truth: dict[str, Mask]) -> NDArray[np.float64]:
     return np.array(middles, float).reshape(-1, 2)[:, ::-1]
 
 
-def network(segmenter: NetworkSegmenter) -> Method:
+def network(segmenter: PhotographSegmenter) -> Method:
     """The network as `perceive` uses it."""
     return lambda path: tell(load_photograph(path), segmenter)
 

@@ -1,8 +1,9 @@
 """`rolling-panda models`: networks, and which one perception uses from its next start.
 
-list     the shipped network and those that were taken into use, with their cards
+list     the shipped networks and those that were taken into use, with their cards
 compare  two networks on the held-out pictures of a dataset
-use      take a network into use, unless it is worse on held-out pictures than the one in use; `shipped` goes back
+use      take a network into use, unless it is worse on held-out pictures than the one in use; `shipped` goes back, and
+         `photographs` is the other network that comes with the program
 """
 
 import argparse
@@ -11,14 +12,15 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from perception.dataset.dataset import Dataset, check, read_dataset
-from perception.models.cards import Model, choose, choose_shipped, chosen, kept, read_model, shipped
+from perception.models.cards import Model, choose, choose_shipped, chosen, kept, photographs, read_model, shipped
 from perception.models.judge import DECISIVE, TOLERANCE, Figures, judge_held_out, worse
 from perception.segmentation.network_segmenter import NetworkSegmenter
 from rolling_panda.errors import InputError, RollingPandaError
 from rolling_panda.runtime.process import ROBOT_ID
 from rolling_panda.runtime.state_folder import usual_state_folder
 
-_SHIPPED = "shipped"
+_SHIPPED, _PHOTOGRAPHS = "shipped", "photographs"
+_MODEL = f"ONNX file, '{_SHIPPED}' or '{_PHOTOGRAPHS}'"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -41,12 +43,12 @@ def _parser() -> argparse.ArgumentParser:
     everything.set_defaults(run=_list)
     two = commands.add_parser("compare", help="two networks on held-out pictures")
     two.set_defaults(run=_compare)
-    two.add_argument("first", metavar="MODEL", help=f"ONNX file, or '{_SHIPPED}'")
-    two.add_argument("second", metavar="MODEL", help=f"ONNX file, or '{_SHIPPED}'")
+    two.add_argument("first", metavar="MODEL", help=_MODEL)
+    two.add_argument("second", metavar="MODEL", help=_MODEL)
     two.add_argument("--data", type=Path, required=True, metavar="DIR", help="dataset with held-out pictures")
     use = commands.add_parser("use", help="take a network into use, unless it is worse than the one in use")
     use.set_defaults(run=_use)
-    use.add_argument("model", metavar="MODEL", help=f"ONNX file, or '{_SHIPPED}'")
+    use.add_argument("model", metavar="MODEL", help=_MODEL)
     use.add_argument("--data", type=Path, metavar="DIR", help="dataset with held-out pictures")
     for command in (everything, use):
         command.add_argument("--robot-id", default=ROBOT_ID, help="robot on the wire (default: %(default)s)")
@@ -58,7 +60,8 @@ def _parser() -> argparse.ArgumentParser:
 def _list(arguments: argparse.Namespace) -> None:
     state = _state(arguments)
     used = chosen(state) or shipped()
-    for model in (shipped(), *kept(state)):
+    everything = {model.sha256: model for model in (*kept(state), photographs(), shipped())}
+    for model in reversed(everything.values()):
         print(f"{'*' if model.sha256 == used.sha256 else ' '} {model.title}")
         if model.card is None:
             print("    no card")
@@ -84,6 +87,10 @@ def _use(arguments: argparse.Namespace) -> None:
         choose_shipped(state)
         print(f"perception uses the shipped network {shipped().title} from its next start")
         return
+    if arguments.model == _PHOTOGRAPHS and arguments.data is None:
+        choose(state, photographs(), {})
+        print(f"perception uses {photographs().title} from its next start")
+        return
     if arguments.data is None:
         raise InputError("give --data with a dataset of held-out pictures, to compare with the network in use")
     model, used, dataset = _model(arguments.model), chosen(state) or shipped(), _dataset(arguments.data)
@@ -105,7 +112,8 @@ def _state(arguments: argparse.Namespace) -> Path:
 
 
 def _model(word: str) -> Model:
-    return shipped() if word == _SHIPPED else read_model(Path(word))
+    named = {_SHIPPED: shipped, _PHOTOGRAPHS: photographs}
+    return named[word]() if word in named else read_model(Path(word))
 
 
 def _dataset(folder: Path) -> Dataset:

@@ -7,7 +7,7 @@ from pathlib import Path
 import msgspec
 
 from perception.models.judge import Figures
-from perception.segmentation.segmenter import SHIPPED
+from perception.segmentation.segmenter import PHOTOGRAPHS, SHIPPED
 from rolling_panda.errors import ConfigError, InputError
 from rolling_panda.resources import resource
 from rolling_panda.runtime.state_folder import open_state_folder, read_kept, replace_durably
@@ -97,6 +97,15 @@ def shipped() -> Model:
         ModelError: It is missing.
     """
     return read_model(resource(SHIPPED))
+
+
+def photographs() -> Model:
+    """The other network that comes with the program, of drawn photographs.
+
+    Raises:
+        ModelError: It is missing.
+    """
+    return read_model(resource(PHOTOGRAPHS))
 
 
 def chosen(state: Path) -> Model | None:

@@ -153,6 +153,34 @@ class NetworkSegmenter:
         return classes, blocks.repeat(block, axis=0).repeat(block, axis=1)[:height, :width]
 
 
+class PhotographSegmenter:
+    """Of several networks, uses for each picture the first to which it is familiar; else the last."""
+
+    def __init__(self, *paths: Path) -> None:
+        """Load and check the networks.
+
+        Raises:
+            ConfigError: As of `NetworkSegmenter`.
+        """
+        self._networks = [NetworkSegmenter(path) for path in paths]
+        #: Used for the last picture.
+        self.used = self._networks[0]
+
+    def classify_surely(
+        self, color: NDArray[np.uint8], depth: NDArray[np.float32] | None
+    ) -> tuple[Labels, NDArray[np.float32] | None]:
+        """As of the network that is used.
+
+        Raises:
+            UnusablePictureError: The colour image is blank.
+        """
+        for network in self._networks:
+            self.used, told = network, network.classify_surely(color, depth)
+            if network.unfamiliar is None:
+                break
+        return told
+
+
 def _width_bias(session: onnxruntime.InferenceSession, path: Path) -> float:
     text = session.get_modelmeta().custom_metadata_map.get("widening", "0")
     try:

@@ -12,8 +12,8 @@ from rolling_panda.messages.types import Reason
 from rolling_panda.resources import resource
 
 SEGMENTERS = ("network", "labels")
-#: The shipped network.
-SHIPPED = "assets/network/vine.onnx"
+#: The shipped networks: of rendered rows, which robots use unless another is chosen, and of drawn photographs.
+SHIPPED, PHOTOGRAPHS = "assets/network/vine.onnx", "assets/network/photographs.onnx"
 
 
 class Segmenter(Protocol):

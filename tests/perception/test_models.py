@@ -11,7 +11,7 @@ from PIL import Image
 from perception import __main__ as process
 from perception.dataset.dataset import UNLABELLED, Entry, Manifest, read_dataset, write_manifest
 from perception.models.__main__ import main
-from perception.models.cards import Card, Data, chosen, read_model, shipped, write_card
+from perception.models.cards import Card, Data, chosen, photographs, read_model, shipped, write_card
 from perception.models.judge import judge_held_out, worse
 from perception.segmentation.frame import CANE, TRUNK
 from perception.segmentation.network_segmenter import NetworkSegmenter
@@ -117,6 +117,15 @@ def test_a_network_that_is_no_worse_is_copied_and_perception_starts_with_it(tmp_
     assert f"* {digest[:12]}.onnx {digest[:12]}" in said and f"  vine.onnx {shipped().sha256[:12]}" in said
     assert use(state, "shipped") == 0
     assert started_with(state) == "shipped"
+
+
+def test_the_shipped_network_for_photographs_is_taken_into_use_by_its_name(tmp_path, capsys):
+    state = tmp_path / "state"
+    assert use(state, "photographs") == 0
+    assert started_with(state) == photographs().sha256
+    assert main(["list", "--state", str(state)]) == 0
+    said = capsys.readouterr().out
+    assert f"* photographs.onnx {photographs().sha256[:12]}" in said and "  vine.onnx" in said
 
 
 def test_a_worse_network_is_refused_and_the_one_in_use_stays(tmp_path, good, capsys):

@@ -5,6 +5,7 @@ import io
 
 import numpy as np
 import pytest
+import skimage.data
 from PIL import Image
 
 from bridge.sim.camera.config import CameraConfig
@@ -12,14 +13,15 @@ from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
 from perception.segmentation.frame import CorruptFrameError, UnusablePictureError, View
-from perception.segmentation.network_segmenter import NetworkSegmenter, network_input
-from perception.segmentation.segmenter import SHIPPED, NoSegmenter, choose_segmenter
+from perception.segmentation.network_segmenter import NetworkSegmenter, PhotographSegmenter, network_input
+from perception.segmentation.segmenter import PHOTOGRAPHS, SHIPPED, NoSegmenter, choose_segmenter
 from rolling_panda import reasons
 from rolling_panda.errors import ConfigError, ModelError
 from rolling_panda.messages.robot import Intrinsics
 from rolling_panda.messages.types import WOOD_CLASSES
 from rolling_panda.resources import resource
 from tests.support import onnx_by_hand
+from tests.support.cameras import looking_left
 
 CLASSES = list(WOOD_CLASSES)
 
@@ -131,7 +133,8 @@ def test_without_the_shipped_weights_every_frame_is_declined_with_the_reason(mon
 
 def test_the_shipped_network_is_small_and_carries_its_card():
     path = resource(SHIPPED)
-    assert path.stat().st_size <= 4 * 2**20
+    assert path.stat().st_size <= 4 * 2**20 and resource(PHOTOGRAPHS).stat().st_size <= 25 * 2**20
+    assert "mate_Wood.jpg" in resource(PHOTOGRAPHS).with_suffix(".md").read_text(encoding="utf-8")
     card = path.with_suffix(".md").read_text(encoding="utf-8")
     assert "python -m perception.training" in card and "Limits:" in card
 
@@ -158,3 +161,14 @@ def test_a_network_says_how_much_too_wide_it_draws_canes(tmp_path):
     ]
     assert said == [0.4, 0.0]
     assert 0.0 <= choose_segmenter("network").width_bias < 1.0 and choose_segmenter("labels").width_bias == 0.0
+
+
+def test_each_picture_is_for_the_network_that_knows_such_pictures():
+    row = grow(VineyardConfig(), 4)
+    image = Camera(CameraConfig(), 4).render(row, looking_left(0.5, -0.05, 1.05))
+    segmenter = PhotographSegmenter(resource(SHIPPED), resource(PHOTOGRAPHS))
+    labels, likely = segmenter.classify_surely(image.color, image.depth)
+    assert segmenter.used.name.startswith("network vine.onnx") and likely is None
+    assert np.mean(labels == image.labels) > 0.95
+    labels, likely = segmenter.classify_surely(skimage.data.chelsea(), None)
+    assert segmenter.used.name.startswith("network photographs.onnx") and likely.shape == labels.shape

@@ -94,7 +94,7 @@ def test_a_picture_of_noise_gives_no_point(tmp_path):
 
 
 def test_a_picture_of_something_else_is_called_unfamiliar(tmp_path):
-    Image.fromarray(skimage.data.chelsea()).save(tmp_path / "vine.jpg")
+    Image.fromarray(skimage.data.hubble_deep_field()).save(tmp_path / "vine.jpg")
     said = run(tmp_path, tmp_path / "out")
     (only,) = said["undecided"]
     assert said["points"] == [] and only["reason"].startswith("Unfamiliar picture") and only["pixel"] is None
@@ -147,7 +147,7 @@ def test_the_command_ends_with_an_error_that_names_the_missing_file(tmp_path, wo
 
 
 def test_a_missing_photograph_is_said_before_the_network_is_loaded(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("perception.perceive.NetworkSegmenter", lambda path: pytest.fail("the network was loaded"))
+    monkeypatch.setattr("perception.perceive.PhotographSegmenter", lambda path: pytest.fail("the network was loaded"))
     assert main([str(tmp_path / "absent.jpg"), "--out", str(tmp_path / "out")]) == 1
     assert "cannot read the image" in capsys.readouterr().err
 

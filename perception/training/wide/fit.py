@@ -35,6 +35,8 @@ _HEAVIER: dict[WoodClass, float] = {
 WEIGHTS = tuple(_HEAVIER.get(kind, 1.0) for kind in WOOD_CLASSES)
 #: Drawn scenes a step, each photographed twice, and pictures of rendered rows a step where there are any.
 _DRAWN, _RENDERED = 3, 2
+#: Of each scene a picture and a mirrored one.
+PICTURES_A_STEP = 2 * _DRAWN + _RENDERED
 #: Rates of learning of decoder and encoder; the rate grows over the first steps and falls over the last share of them.
 _RATE, _ENCODER_RATE, _WARM, _FALL = 2e-3, 6e-4, 100, 0.25
 #: Of the running mean of the weights that is kept as the result.

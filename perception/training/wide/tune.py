@@ -22,7 +22,7 @@ from torch import Tensor, nn
 
 from perception.arrays import Labels
 from perception.dataset.dataset import MANIFEST, UNLABELLED, Dataset, check, read_dataset
-from perception.models.cards import Card, Data, read_model, write_card
+from perception.models.cards import Card, Data, photographs, read_model, write_card
 from perception.models.judge import DECISIVE, Figures, judge_held_out
 from perception.segmentation.frame import BACKGROUND, GROUND
 from perception.segmentation.network_segmenter import NetworkSegmenter, network_input
@@ -35,8 +35,8 @@ from perception.training.wide.network import PhotographNetwork, load_pretrained
 from rolling_panda.errors import InputError, RollingPandaError
 from rolling_panda.messages.types import WOOD_CLASSES
 
-#: `--from` this begins with the encoder of ImageNet.
-IMAGENET = "imagenet"
+#: `--from` these begins with the encoder of ImageNet, or with the shipped network of drawn photographs.
+IMAGENET, _PHOTOGRAPHS = "imagenet", "photographs"
 #: Parts of one's own pictures in a batch; one drawn picture is added, so that what was learned before is kept.
 _OWN = 3
 #: Pictures by which a network tells what is familiar.
@@ -51,7 +51,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit code."""
     parser = argparse.ArgumentParser(prog="rolling-panda train", description=__doc__)
     parser.add_argument(
-        "--from", dest="begin", required=True, metavar="MODEL", help=f"ONNX file of `….wide`, or '{IMAGENET}'"
+        "--from",
+        dest="begin",
+        required=True,
+        metavar="MODEL",
+        help=f"'{_PHOTOGRAPHS}', '{IMAGENET}' or an ONNX file of `….wide`",
     )
     parser.add_argument("--data", type=Path, required=True, nargs="+", metavar="DIR", help="datasets")
     parser.add_argument(
@@ -80,7 +84,9 @@ def _train(words: argparse.Namespace, options: list[str]) -> None:
     datasets = [_read(folder) for folder in words.data]
     network = PhotographNetwork(len(WOOD_CLASSES))
     torch.manual_seed(words.seed)
-    begun = None if words.begin == IMAGENET else read_model(Path(words.begin))
+    begun = None
+    if words.begin != IMAGENET:
+        begun = photographs() if words.begin == _PHOTOGRAPHS else read_model(Path(words.begin))
     if begun is None:
         load_pretrained(network.encoder)
     else:
