@@ -33,11 +33,11 @@ class HierarchyConfig(Struct, frozen=True, forbid_unknown_fields=True):
         blade_distance: d_s of the blades (m), which work near wires.
         cutter_distance: d_s of the cutter's body (m), whose capsule is 9 mm larger than the body.
         cane_distance: d_s of the robot's other parts to retained canes (m).
-        cane_speed: ξ for canes (m/s), larger than for stiff obstacles and matched to the approach to a cut.
-        cane_braking: Deceleration a for canes (m/s²), that of the approach to a cut.
+        cane_speed: v_i for canes (m/s), larger than for stiff obstacles and matched to the approach to a cut.
+        cane_braking: Deceleration a_i for canes (m/s²), that of the approach to a cut.
         collision_influence: d_i, distance below which a pair slows its approach (m).
-        collision_speed: ξ, largest approach speed at d_i and largest separation speed below d_s (m/s).
-        collision_braking: Deceleration a in the approach limit (m/s²).
+        collision_speed: v_i, largest approach speed at d_i and largest separation speed below d_s (m/s).
+        collision_braking: Deceleration a_i in the approach limit (m/s²).
         tipping: Whether the tipping guard is on, which keeps wheels and caster on the ground.
     """
 

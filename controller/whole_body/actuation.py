@@ -1,7 +1,7 @@
-"""Velocity coordinates of the methods: ν = [v, ω, q̇₁…q̇₇], forward speed and yaw rate instead of wheels.
+"""Velocity coordinates of the methods: ν = [v, φ̇, q̇₁…q̇₇], forward speed and yaw rate instead of wheels.
 
 In ν the limits of the base are bounds of single entries, and a task of the base is a row with a single 1. ν and ξ̇ are
-one to one: θ̇_l = (v − μω)/R, θ̇_r = (v + μω)/R.
+one to one: θ̇_l = (v − μφ̇)/R, θ̇_r = (v + μφ̇)/R.
 """
 
 import numpy as np
@@ -16,9 +16,9 @@ class Actuation:
     def __init__(self, drive: DifferentialDrive) -> None:
         """Precompute both 2×2 maps."""
         R, mu = drive.wheel_radius, drive.half_track
-        #: Wheel speeds [θ̇_l, θ̇_r] = wheels @ [v, ω].
+        #: Wheel speeds [θ̇_l, θ̇_r] = wheels @ [v, φ̇].
         self.wheels: Array = np.array([[1.0 / R, -mu / R], [1.0 / R, mu / R]])
-        #: [v, ω] = twist @ [θ̇_l, θ̇_r].
+        #: [v, φ̇] = twist @ [θ̇_l, θ̇_r].
         self.twist: Array = np.array([[R / 2, R / 2], [-R / (2 * mu), R / (2 * mu)]])
 
     def nu(self, xi: Array) -> Array:

@@ -1,12 +1,12 @@
 """Strict priorities as a cascade of two small dense quadratic programs.
 
-With the velocities scaled by their limits, x = ν/ν_max, and the QR factorisation Jᵀ = Q₁ R, every x is Q₁ y + Z z with
-Z spanning ker J: J x = Rᵀ y, whatever z is.
+With the velocities scaled by their limits, ν̄ = ν/ν_max, the Jacobian J over ν̄ and the QR factorisation Jᵀ = Q₁ R,
+every ν̄ is Q₁ y + Z z with Z spanning ker J: J ν̄ = Rᵀ y, whatever z is.
 
 1. Bounds and rows are constraints of both programs. If they are infeasible together, the rows (never the bounds) are
    first relaxed by the smallest amount in the least-squares sense.
 2. Tool: min ‖Rᵀ y − α b − c‖² + κ‖b‖² (1 − α)² + λ²‖y‖² + ε‖z − z_sent‖² over y, z, 0 ≤ α ≤ α_max.
-3. Null space: min ‖T x − t‖² over z alone, with y and α from step 2. It cannot change the tool's velocity.
+3. Null space: min ‖T ν − t‖² over z alone, with y and α from step 2. It cannot change the tool's velocity.
 
 If the unconstrained optimum satisfies all inequalities, it is the solution, and the programs are not run.
 """
@@ -123,7 +123,7 @@ class Cascade:
         ):
             return Answer(nu, 1.0, None, -1)
         R = R[:m]
-        # Rows over [y, z]: first the bounds of x, then the others.
+        # Rows over [y, z]: first the bounds of ν̄, then the others.
         rows = np.empty((n + k, 1 + n))
         rows[:, 0] = 0.0
         rows[:n, 1:] = Q

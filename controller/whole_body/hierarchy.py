@@ -229,7 +229,7 @@ def tool_rows(
         R: Rotation of the tool, R_odom_tool (3×3).
         twist: Desired twist (6).
         speed_cap: Largest speed of the tool's origin (m/s); b is for the twist slowed to it.
-        wheels: Wheel speeds of [v, ω].
+        wheels: Wheel speeds of [v, φ̇].
         weight: Weights of the rows (6).
         J: Written.
         b: Written.

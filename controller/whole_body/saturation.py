@@ -51,7 +51,7 @@ class Saturation:
         base = config.base_acceleration / robot.drive.wheel_radius
         self.acceleration[:2] = min(base, float(limits.acceleration[0]))
         self._step = self.acceleration * dt
-        # Rows that give v and ω as fractions of their limits.
+        # Rows that give v and φ̇ as fractions of their limits.
         twist = Actuation(robot.drive).twist
         self._base_shares = twist / np.array([[config.base_speed], [config.base_yaw_rate]])
         # Limits for braking, the largest that the final check allows.

@@ -1,13 +1,13 @@
 """Velocity bounds of every actuator for one period, feasible by construction.
 
-An arm joint with the distance d to its limit, the braking deceleration a and the period dt may have the velocity v for
-which v dt + v²/2a ≤ d, that is v ≤ −a dt + √((a dt)² + 2 a d): after one period at v it can still stop. From a velocity
-inside this bound the next bound can be reached by braking at a, so that the bounds are never empty. This uses half of
-the joint's acceleration; the rest is for the servo's lag.
+A joint of the arm brakes at half of its acceleration a; the other half is for the servo's lag. With the distance r to
+its limit and the period dt it may have the velocity q̇ for which q̇ dt + q̇²/a ≤ r, that is q̇ ≤ −(a/2) dt + √(((a/2)
+dt)² + a r): after one period at q̇ it can still stop. From a velocity inside this bound the next bound can be reached
+by braking at a/2, so that the bounds are never empty.
 
-The acceleration may change by j dt in a period. So a joint approaches the bound above by the law of `jerk_limit.py`,
-which needs no more than j dt. The bound itself falls by at most b dt in a period, which is added to the change of the
-velocity.
+The acceleration may change by j dt in a period, with the jerk j. So a joint approaches the bound above by the law of
+`jerk_limit.py`, which needs no more than j dt. The bound itself falls by at most (a/2) dt in a period, which is added
+to the change of the velocity.
 
 Outside these guarantees (a start beyond a limit, a velocity above it) the bounds allow the strongest braking only.
 """
@@ -28,7 +28,7 @@ from rolling_panda.model.robot import ARM_Q, ARM_XI, RobotModel
 
 #: Rate at which a joint outside its limit returns (1/s), and its largest velocity then (rad/s).
 _RETURN, _RETURN_SPEED = 2.0, 0.2
-#: Constant limits; SI, of the arm's joints (7), of v and ω (2) or of a wheel.
+#: Constant limits; SI, of the arm's joints (7), of v and φ̇ (2) or of a wheel.
 _CONSTANTS = np.dtype(
     [
         ("highest", "f8", 7),
@@ -50,7 +50,7 @@ _CONSTANTS = np.dtype(
 class Bounds(Struct, frozen=True):
     """lower ≤ ν ≤ upper (9), and the same for the two wheels' speeds (2).
 
-    `ramp` is [v, ω] (2) after one period of braking along the same arc, which is always inside.
+    `ramp` is [v, φ̇] (2) after one period of braking along the same arc, which is always inside.
     """
 
     lower: Array
@@ -150,7 +150,7 @@ def _wheel(sent: float, step: float, most: float, ramp: float) -> tuple[float, f
 
 @compiled(PAIR(NUMBER, NUMBER, NUMBER, NUMBER, NUMBER))
 def _base(sent: float, step: float, brake: float, most: float, ramp: float) -> tuple[float, float]:
-    """Bounds of v or ω: braking may be stronger than speeding up, but not beyond standstill."""
+    """Bounds of v or φ̇: braking may be stronger than speeding up, but not beyond standstill."""
     low, high = sent - step, sent + step
     if sent > 0.0:
         low = min(low, max(0.0, sent - brake))

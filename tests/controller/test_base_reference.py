@@ -11,7 +11,7 @@ TASK = BaseReference(1.0, 1.0, 1.0, 0.8, SPEED)
 
 
 def wanted(q, reference, rate, base="row"):
-    """[v, ω] that the task asks for; NaN where it asks for nothing."""
+    """[v, φ̇] that the task asks for; NaN where it asks for nothing."""
     J, t = np.zeros((2, 9)), np.zeros(2)
     problem = IkProblem(q, ROBOT.kinematics(q), np.zeros(9), ToolTask(np.zeros(6)), Posture(reference, rate), base)
     TASK.write(problem, J, t)

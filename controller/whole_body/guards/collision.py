@@ -1,13 +1,13 @@
 """Guard: distances of the robot to itself, the ground and obstacles.
 
-For each pair of parts nearer than d_i, with n the direction between their nearest points and ḋ = nᵀ(v_b − v_a):
+For each pair of parts nearer than d_i, with ḋ the rate of their distance d:
 
-ḋ ≥ −min( ξ (d − d_s)/(d_i − d_s), −a dt + √((a dt)² + 2 a (d − d_s)) )
+ḋ ≥ −min( v_i (d − d_s)/(d_i − d_s), −a_i dt + √((a_i dt)² + 2 a_i (d − d_s)) )
 
-The first term is Faverjon and Tournassoud's velocity damper. The second limits the approach to the speed from which the
-pair can still stop, after one more period, with the deceleration a. Below d_s the pair has to separate. The blades and
-the cutter's body have their own d_s. Canes have their own ξ and a, because the tool slides in between them and they
-bend.
+The first term is Faverjon and Tournassoud's velocity damper. The second limits the approach to the speed from which
+the pair can still stop, after one more period, with the deceleration a_i. Below d_s the pair has to separate. The
+blades and the cutter's body have their own d_s. Canes have their own v_i and a_i, because the tool slides in between
+them and they bend.
 """
 
 import math
@@ -61,8 +61,8 @@ def _damp(distance: Array, kept: Array, influence: float, speed: Array, brake: A
         distance: d (k, m).
         kept: d_s (k, m).
         influence: d_i (m).
-        speed: ξ, and the fastest that a pair has to part (k, m/s).
-        brake: a (k, m/s²).
+        speed: v_i, and the fastest that a pair has to part (k, m/s).
+        brake: a_i (k, m/s²).
         dt: Of the control period (s).
         lower: Written (k, m/s).
     """

@@ -1,7 +1,7 @@
 """Task: the base follows position and heading of the posture.
 
 With the error (e_x, e_y, e_φ) of the reference in base_link:
-v = v_ref cos e_φ + k_x e_x, ω = ω_ref + k_y v_ref e_y + k_φ sin e_φ, the classic law for a unicycle (Kanayama 1990).
+v = v_ref cos e_φ + k_x e_x, φ̇ = φ̇_ref + k_y v_ref e_y + k_φ sin e_φ, the classic law for a unicycle (Kanayama 1990).
 A lateral error is corrected by steering while the base drives, as a differential drive cannot move sideways.
 """
 

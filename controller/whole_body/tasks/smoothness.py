@@ -29,7 +29,7 @@ class Smoothness:
 
 @compiled(NOTHING(PACKED, VECTOR, VECTOR, VECTOR))
 def _keep(twist: Array, sent: Array, weight: Array, target: Array) -> None:
-    """Write the targets (9) after ξ̇ `sent` (9); `twist` gives [v, ω] of the wheels' speeds (2×2)."""
+    """Write the targets (9) after ξ̇ `sent` (9); `twist` gives [v, φ̇] of the wheels' speeds (2×2)."""
     for i in range(2):
         target[i] = weight[i] * (twist[i, 0] * sent[0] + twist[i, 1] * sent[1])
     for i in range(2, 9):
