@@ -1,9 +1,12 @@
 """Velocity bounds of every actuator for one period, feasible by construction.
 
 A joint of the arm brakes at half of its acceleration a; the other half is for the servo's lag. With the distance r to
-its limit and the period dt it may have the velocity q̇ for which q̇ dt + q̇²/a ≤ r, that is q̇ ≤ −(a/2) dt + √(((a/2)
-dt)² + a r): after one period at q̇ it can still stop. From a velocity inside this bound the next bound can be reached
-by braking at a/2, so that the bounds are never empty.
+its limit and the period dt it may have the velocity q̇ for which q̇ dt + q̇²/a ≤ r, that is
+
+q̇ ≤ −(a/2) dt + √(((a/2) dt)² + a r).
+
+After one period at q̇ it can still stop. From a velocity inside this bound the next bound can be reached by braking at
+a/2, so that the bounds are never empty.
 
 The acceleration may change by j dt in a period, with the jerk j. So a joint approaches the bound above by the law of
 `jerk_limit.py`, which needs no more than j dt. The bound itself falls by at most (a/2) dt in a period, which is added
