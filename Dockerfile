@@ -18,6 +18,7 @@ COPY bridge bridge
 COPY controller controller
 COPY perception perception
 COPY recorder recorder
+COPY labelling labelling
 COPY server server
 RUN /tools/bin/pip wheel --no-cache-dir --no-deps --no-build-isolation --wheel-dir /wheel .
 

@@ -81,7 +81,7 @@ check: $(VENV)/.project
 # Built anew when something of it has changed. `--strict` turns a warning, such as a broken link, into an error; it would
 # count none with `--quiet`.
 DOCUMENTED := mkdocs.yml $(wildcard *.md benchmarks/*.md) assets/network/vine.md web/icon.svg $(shell find docs/* \
-	rolling_panda bridge controller perception server recorder -name __pycache__ -prune -o \( -type d -o -type f \) -print)
+	rolling_panda bridge controller perception server recorder labelling -name __pycache__ -prune -o \( -type d -o -type f \) -print)
 docs: build/docs/.built
 build/docs/.built: build/docs/.installed $(DOCUMENTED)
 	NO_MKDOCS_2_WARNING=1 build/docs/bin/mkdocs build --strict

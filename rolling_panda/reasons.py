@@ -1427,6 +1427,19 @@ def lines_left_out(cause: Reason, lines: float) -> None:
     """{cause} (and {lines:.0f} lines like it before)."""
 
 
+# Labels
+
+
+@_reason("warning", "load it anew, or save yours all the same")
+def mask_changed(detail: str) -> None:
+    """{detail}."""
+
+
+@_reason("warning", "")
+def label_file_unusable(detail: str) -> None:
+    """{detail}."""
+
+
 # Bridge: its stored state
 
 

@@ -6,7 +6,6 @@ import contextlib
 import re
 import resource
 import secrets
-import socket
 import threading
 from collections.abc import Callable, Generator, Mapping
 from pathlib import Path
@@ -28,7 +27,7 @@ from server.auth.passwords import Passwords
 from server.auth.sessions import Sessions
 from server.config import ServerConfig
 from server.connections.http_protocol import SiteConfig
-from server.connections.listener import Connections, Listener
+from server.connections.listener import Connections, Listener, listen
 from server.connections.websocket_protocol import LimitedSocket
 from server.loop import Loop, watch_accounts
 from server.robots.app_state import AppState
@@ -86,28 +85,6 @@ def run(context: ProcessContext) -> None:
             asyncio.run(
                 serve(config, wires, sessions, listener, address, context.stopping, access_options, freeze_heap)
             )
-
-
-def listen(host: str, port: int) -> Listener:
-    """The page's socket, bound before anything else starts.
-
-    Raises:
-        InputError: The port is taken or may not be used.
-    """
-    listener = Listener()
-    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    # Connections inherit it. Otherwise the second part of a response waits for the acknowledgement of the first, which
-    # takes 40 ms; asyncio sets it only on sockets that name their protocol.
-    listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    try:
-        listener.bind((host, port))
-        # Another program may have bound the port with the same option, which only listening detects.
-        listener.listen(64)
-    except (OSError, OverflowError) as error:
-        listener.close()
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"cannot listen on {host}:{port}: {reason}. Choose another with --port.") from error
-    return listener
 
 
 async def serve(

@@ -24,7 +24,7 @@ ROOT = Path(__file__).resolve().parents[2]
 JUSTIFIED = Path(__file__).with_name("justified.toml")
 #: mutmut and what it needs, beside the project's own packages: `make mutation` makes it.
 _PYTHON = ROOT / "build/mutation/bin/python"
-_CODE = ("rolling_panda", "bridge", "controller", "perception", "server", "recorder", "benchmarks")
+_CODE = ("rolling_panda", "bridge", "controller", "perception", "server", "recorder", "labelling", "benchmarks")
 _BESIDE = ("assets", "web", "docs", "deploy", "README.md")
 _SETTINGS = """
 [tool.mutmut]

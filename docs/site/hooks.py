@@ -19,7 +19,7 @@ from mode_diagram import draw
 
 ROOT = Path(__file__).resolve().parents[2]
 #: In the order of the API reference. Benchmarks and tests are no interface.
-PACKAGES = ("rolling_panda", "bridge", "controller", "perception", "server", "recorder")
+PACKAGES = ("rolling_panda", "bridge", "controller", "perception", "server", "recorder", "labelling")
 #: Folders whose files a text may name only if they exist.
 NAMED = {*PACKAGES, "assets", "benchmarks", "deploy", "docs", "tests", "web"}
 #: Where documents outside `docs/` are on the site.

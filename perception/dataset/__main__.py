@@ -1,4 +1,4 @@
-"""`rolling-panda dataset`: labelled pictures of a vineyard, from and for other labelling programs.
+"""Labelled pictures of a vineyard, from and for other labelling programs.
 
 import  reads COCO, CVAT for images, labelme, VGG Image Annotator or masks, and writes a dataset
 export  writes a dataset for COCO, CVAT or labelme
@@ -64,7 +64,7 @@ VOCABULARIES = {
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit code."""
-    arguments = _parser().parse_args(argv)
+    arguments = dataset_parser(__doc__ or "")[0].parse_args(argv)
     try:
         arguments.run(arguments)
     except (RollingPandaError, OSError) as error:
@@ -73,9 +73,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _parser() -> argparse.ArgumentParser:
+def dataset_parser(
+    description: str,
+) -> tuple[argparse.ArgumentParser, "argparse._SubParsersAction[argparse.ArgumentParser]"]:
+    """The parser of the command, and its commands, to which others can be added."""
     parser = argparse.ArgumentParser(
-        prog="rolling-panda dataset", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        prog="rolling-panda dataset", description=description, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     take = commands.add_parser("import", help="write a dataset from labels of another program")
@@ -108,7 +111,7 @@ def _parser() -> argparse.ArgumentParser:
     look = commands.add_parser("check", help="load every picture and mask")
     look.set_defaults(run=_check)
     look.add_argument("dataset", type=Path, metavar="DIR")
-    return parser
+    return parser, commands
 
 
 def _import(arguments: argparse.Namespace) -> None:

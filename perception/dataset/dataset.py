@@ -18,6 +18,7 @@ from perception.arrays import Labels
 from perception.segmentation.frame import CANE, NODE, SPUR
 from rolling_panda.errors import InputError
 from rolling_panda.messages.types import WOOD_CLASSES
+from rolling_panda.runtime.state_folder import replace_durably
 
 #: Values of a mask besides the classes: background or ground, and what nobody has labelled.
 FAR, UNLABELLED = len(WOOD_CLASSES), 255
@@ -205,8 +206,8 @@ def add_picture(folder: Path, name: str, source: Path, labels: Labels) -> str:
 
 
 def write_manifest(folder: Path, manifest: Manifest) -> None:
-    """Write `dataset.json`."""
-    (folder / MANIFEST).write_bytes(msgspec.json.format(msgspec.json.encode(manifest), indent=1) + b"\n")
+    """Write `dataset.json`; an interruption leaves the old one or the new."""
+    replace_durably(folder / MANIFEST, msgspec.json.format(msgspec.json.encode(manifest), indent=1) + b"\n")
 
 
 def load_picture(path: Path) -> NDArray[np.uint8]:

@@ -16,6 +16,7 @@ from weakref import WeakKeyDictionary
 import msgspec
 
 from rolling_panda import reasons
+from rolling_panda.errors import InputError
 from rolling_panda.messages.types import Reason
 from rolling_panda.runtime.token_bucket import TokenBucket
 from server.config import ServerConfig
@@ -178,6 +179,28 @@ class Listener(socket.socket):
                 with suppress(OSError):
                     accepted.send(refusal(503, reasons.too_many_connections()))
             accepted.close()
+
+
+def listen(host: str, port: int) -> Listener:
+    """The page's socket, bound before anything else starts.
+
+    Raises:
+        InputError: The port is taken or may not be used.
+    """
+    listener = Listener()
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    # Connections inherit it. Otherwise the second part of a response waits for the acknowledgement of the first, which
+    # takes 40 ms; asyncio sets it only on sockets that name their protocol.
+    listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    try:
+        listener.bind((host, port))
+        # Another program may have bound the port with the same option, which only listening detects.
+        listener.listen(64)
+    except (OSError, OverflowError) as error:
+        listener.close()
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"cannot listen on {host}:{port}: {reason}. Choose another with --port.") from error
+    return listener
 
 
 class _Counted(socket.socket):

@@ -31,7 +31,7 @@ def made_by_page() -> dict[str, set[str]]:
 
 def made_by_product() -> set[str]:
     """Codes that a process makes."""
-    packages = ("bridge", "controller", "perception", "recorder", "rolling_panda", "server")
+    packages = ("bridge", "controller", "labelling", "perception", "recorder", "rolling_panda", "server")
     paths = [path for package in packages for path in (ROOT / package).rglob("*.py")]
     texts = (path.read_text(encoding="utf-8") for path in paths if path != Path(reasons.__file__))
     return set().union(*(made_in(text) for text in texts))

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-PACKAGES = ("rolling_panda", "bridge", "controller", "perception", "server", "recorder", "benchmarks")
+PACKAGES = ("rolling_panda", "bridge", "controller", "perception", "server", "recorder", "labelling", "benchmarks")
 
 
 def imports(file: Path) -> set[str]:

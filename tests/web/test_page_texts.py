@@ -8,6 +8,7 @@ from typing import get_args
 import pytest
 from playwright.sync_api import Page, expect
 
+from perception.dataset.dataset import VALUES
 from rolling_panda import messages as m
 from rolling_panda.messages import types
 from rolling_panda.resources import resource
@@ -33,6 +34,9 @@ FAMILIES: dict[str, Sequence[str]] = {
     "telemetry.${}": ("low", "high", ""),
     "reading.${}": READINGS,
     "reading.${}.hint": READINGS,
+    "label.${}": ("train", "held-out"),
+    "label.${}.hint": ("train", "held-out"),
+    "label.class.${}": tuple(name for name in VALUES if name != "unlabelled"),
     "report.${}": ("TakeControl", "GrantControl", "ReturnControl"),
 }
 
