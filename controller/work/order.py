@@ -1,4 +1,4 @@
-"""The order of work and the approach directions that operators have chosen."""
+"""Joins the order that operators want with the planner's, and keeps the approach directions that they have chosen."""
 
 import math
 from collections.abc import Callable, Sequence
