@@ -229,6 +229,9 @@ def test_the_page_is_small_and_keeps_to_its_own_files() -> None:
     later = {"rp-charts.js", "rp-report.js", "rp-order.js", "rp-preview.js", "preview.js"}
     later |= {"rp-robots.js", "lease-worker.js"}
     elsewhere = {"sign-in.js", "frame.js", "offscreen-framebuffer.js"}
+    # The page to label pictures is a page of its own.
+    elsewhere |= {script.name for script in scripts if script.parent.name == "label"}
+    elsewhere |= {script.name for script in scripts if script.name.startswith(("rp-label-", "label."))}
     assert {script.name for script in set(scripts) - first} - elsewhere == later, "what it fetches when opened"
     # Their indentation is not sent, so that none may lie within a text.
     assert [line for script in sent.values() for line in script.splitlines() if line.count("`") % 2] == []
@@ -245,7 +248,7 @@ def test_the_page_is_small_and_keeps_to_its_own_files() -> None:
 
 
 #: Imports of the page's scripts go to the left alone.
-FOLDERS = ("js/state", "js/link", "js/control", "js/views", "components", "js")
+FOLDERS = ("js/state", "js/link", "js/control", "js/views", "js/label", "components", "js")
 
 
 def test_imports_between_the_folders_of_the_page_go_one_way() -> None:
