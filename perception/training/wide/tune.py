@@ -190,9 +190,9 @@ class Tuner:
         # Its normalisation stays as it was trained: batches are small.
         network.eval()
         self._artist = Artist(size)
-        pictures = (dataset.load(name) for dataset in datasets for name in dataset.names("train"))
+        pictures = [dataset.load(name) for dataset in datasets for name in dataset.names("train")]
         # A picture without a label teaches nothing.
-        self._pictures = [each for each in pictures if (each[1] != UNLABELLED).any()]
+        self._pictures = [each for each in pictures if (each[1] != UNLABELLED).any()] or pictures
         held_out = [dataset.load(name) for dataset in datasets for name in dataset.names("held-out")]
         self._held_out = [_scaled(color, labels, 1.0, 0) for color, labels in held_out]
         encoder = set(network.encoder.parameters())
