@@ -34,9 +34,8 @@ from controller.supervision.permission import Situation, allowed, refusal
 from controller.supervision.supervisor import Supervisor
 from controller.whole_body.task import Method
 from controller.work.movement import MotionResult, Movement
-from controller.work.next_cut import Found
-from controller.work.point_queue import PointQueue, Ticket
-from controller.work.queue_requests import QueueRequests
+from controller.work.point_queue import PointQueue, QueueRequests, Ticket
+from controller.work.posture_search import Found
 from controller.work.survey import open_place
 from rolling_panda import commands as intents
 from rolling_panda import messages as m

@@ -14,9 +14,9 @@ from bridge.sim.camera.renderer import Camera
 from bridge.sim.robot.cutter import close_blades
 from bridge.sim.vineyard.row import Array, Row
 from controller.config import ControllerConfig
-from controller.work.cut_checks import not_as_accepted
-from controller.work.cut_pose import cut_poses
+from controller.work.close_up import not_as_accepted
 from controller.work.point_queue import Ticket
+from controller.work.posture_search import cut_poses
 from perception.config import PerceptionConfig
 from perception.segmentation.frame import decode_frame
 from perception.segmentation.segmenter import Segmenter

@@ -12,8 +12,7 @@ from controller.planning.preview_plan import Preview, PreviewRequest
 from controller.planning.rollout import Rollout
 from controller.planning.work_plan import PlannedCut, PlanRequest, WorkPlan
 from controller.whole_body.registry import make_method
-from controller.work.cut_clearance import CutClearance
-from controller.work.posture_search import CutPlan, PostureSearch, completed
+from controller.work.posture_search import CutClearance, CutPlan, PostureSearch, completed
 from rolling_panda.config import RobotConfig
 from rolling_panda.errors import ControlError
 from rolling_panda.messages.perception import Obstacles

@@ -7,7 +7,7 @@ import numpy as np
 
 from controller.config import ControllerConfig
 from controller.motion.tool_motion import ToolMotion
-from controller.work.approach_segments import ApproachSegments
+from controller.work.cutting import ApproachSegments
 from controller.work.posture_search import CutPlan
 from rolling_panda.model.differential_drive import Array
 

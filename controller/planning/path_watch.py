@@ -17,7 +17,7 @@ from controller.planning.preview_plan import STEP, Preview, SweptVolume
 from controller.whole_body.collision_geometry import BLADES
 from controller.whole_body.compiled import NOTHING, NUMBER, PACKED, VECTOR, compiled
 from controller.whole_body.obstacle import Axes
-from controller.work.cut_clearance import CLEARANCE
+from controller.work.posture_search import CLEARANCE
 from rolling_panda import reasons
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.messages.supervision import PreviewedCut

@@ -1,11 +1,22 @@
-"""Requests for close-up pictures of points, and their results."""
+"""Close-up pictures of points, and what they decide before and after a cut.
+
+After a cut the cutter reports whether the blades met resistance, and the camera whether the wood beyond is gone. If
+both report an intact cane, it is cut once more. If they contradict each other, an operator decides.
+"""
 
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
+from controller.config import WorkConfig
+from controller.motion.follower import Measured
+from controller.motion.tool_motion import ToolMotion
+from controller.work.point_queue import PointQueue, Ticket
 from rolling_panda import messages as m
 from rolling_panda import reasons
-from rolling_panda.messages.perception import CloseUpResult, Finding
+from rolling_panda.messages.perception import CloseUpResult, Finding, PruningPoint
+from rolling_panda.messages.types import Outcome, PointState, Reason
 
 #: A request is repeated this often until its picture has come (s).
 _REPEAT_S = 0.05
@@ -94,3 +105,134 @@ class CloseUpClient:
     def _again(self, asked: _Asked, now: float) -> None:
         self._number += 1
         asked.number, asked.since, asked.sent_at = self._number, now, -math.inf
+
+
+#: Time limit for the request of a close-up after a cut (s); after it the cutter's report counts.
+_REQUEST_WITHIN_S = 4.0
+
+
+@dataclass
+class _Ended:
+    """A cut that ended: the cutter's report, its time, and whether a close-up was requested."""
+
+    outcome: Outcome
+    report: Reason
+    since: float
+    requested: bool = False
+
+
+class PostCutCheck:
+    """Decides the outcome of cuts that the cutter has reported. Pure apart from the queue: time is an argument."""
+
+    def __init__(self, queue: PointQueue, close_ups: CloseUpClient, check: bool) -> None:
+        """Bind the parts.
+
+        Args:
+            queue: The queue, which gets the result.
+            close_ups: Client for the pictures.
+            check: False accepts the cutter's report at once.
+        """
+        self._queue, self._close_ups, self._check = queue, close_ups, check
+        self._ended: dict[str, _Ended] = {}
+        self._tried: dict[str, PruningPoint | None] = {}
+
+    @property
+    def pending(self) -> bool:
+        """Whether a cut is still to be settled."""
+        return bool(self._ended)
+
+    def start(self, point_id: str, outcome: Outcome, report: Reason, now: float) -> None:
+        """The cutter has said how a cut ended: DONE or FAILED_NOT_CUT; UNKNOWN is settled with that."""
+        if not self._check or outcome == "UNKNOWN":
+            self._end(point_id, outcome or "UNKNOWN", report)
+            return
+        self._ended[point_id] = _Ended(outcome, report, now)
+
+    def request_close_up(self, point_id: str, now: float) -> None:
+        """The camera sees the place now; requests one close-up."""
+        ended = self._ended.get(point_id)
+        if ended is not None and not ended.requested:
+            ended.requested = True
+            self._close_ups.ask(point_id, "severed", now)
+
+    def step(self, now: float) -> list[Reason]:
+        """Decide the cuts that can be decided; returns what is logged."""
+        said = []
+        for point_id, ended in list(self._ended.items()):
+            close_up = self._close_ups.answer(point_id, now) if ended.requested else None
+            if close_up is not None:
+                said.append(self._settle(point_id, ended, close_up.finding, _why(close_up)))
+            elif not ended.requested and now - ended.since > _REQUEST_WITHIN_S:
+                said.append(self._settle(point_id, ended, "unseen", reasons.robot_left()))
+        return said
+
+    def _settle(self, point_id: str, ended: _Ended, finding: str, why: Reason) -> Reason:
+        del self._ended[point_id]
+        self._close_ups.forget(point_id)
+        done = ended.outcome == "DONE"
+        if finding == "severed":
+            if done:
+                return self._end(point_id, "DONE", reasons.cut_and_gone())
+            return self._end(point_id, "UNKNOWN", reasons.gone_but(ended.report))
+        if finding == "unseen":
+            return self._end(point_id, ended.outcome or "UNKNOWN", reasons.unseen_after(ended.report, why))
+        ticket = self._queue.get(point_id)
+        accepted = None if ticket is None else ticket.accepted
+        if self._tried.get(point_id) is None or self._tried[point_id] is not accepted:
+            self._tried[point_id] = accepted
+            again = reasons.stands_cut_again(ended.report)
+            self._queue.again(point_id, again)
+            return reasons.cut_ended(point_id, again)
+        if done:
+            return self._end(point_id, "UNKNOWN", reasons.stands_unknown(ended.report))
+        return self._end(point_id, "FAILED_NOT_CUT", reasons.stands_not_cut(ended.report))
+
+    def _end(self, point_id: str, state: PointState, reason: Reason) -> Reason:
+        self._tried.pop(point_id, None)
+        self._queue.resolve(point_id, state, reason)
+        told = reasons.cut_done if state == "DONE" else reasons.cut_ended
+        return told(point_id, reason)
+
+
+#: From a larger distance the base has to move before the tool enters the canes (m).
+_BASE_NEAR = 0.1
+
+
+def not_as_accepted(close_up: CloseUpResult, ticket: Ticket | None, tolerance: float) -> Reason | None:
+    """Reason why a point is not cut after its close-up; None if it is.
+
+    Args:
+        close_up: Result of the close-up.
+        ticket: Ticket of the point.
+        tolerance: Largest displacement since the acceptance (m).
+    """
+    if ticket is None or ticket.accepted is None:
+        return reasons.not_accepted_any_more()
+    if close_up.finding == "severed":
+        return reasons.gone_already()
+    if close_up.finding == "changed":
+        return reasons.changed_in_close_up(_why(close_up))
+    if close_up.finding == "unseen" or close_up.position is None:
+        return reasons.unseen_in_close_up(_why(close_up))
+    moved = float(np.linalg.norm(np.subtract(close_up.position, ticket.accepted.position)))
+    if moved > tolerance:
+        return reasons.moved_in_close_up(1e3 * moved)
+    return None
+
+
+def _why(close_up: CloseUpResult) -> Reason:
+    return close_up.reason or reasons.unexplained()
+
+
+def camera_ready(robot: Measured, motion: ToolMotion, config: WorkConfig) -> bool:
+    """Whether the camera has the point in view from near, and hardly moves.
+
+    Args:
+        robot: Measured robot.
+        motion: To where the tool is clear of the canes.
+        config: How near, and how slow.
+    """
+    away = math.dist(robot.kinematics.T_odom_tool.translation, motion.goal.translation)
+    if away >= config.close_up_within or math.dist(robot.q[:2], motion.q_goal[:2]) >= _BASE_NEAR:
+        return False
+    return math.hypot(*(robot.kinematics.J_xi[:3] @ robot.sent)) < config.close_up_speed

@@ -5,10 +5,9 @@ import math
 import numpy as np
 
 from controller.config import ControllerConfig
-from controller.motion.follower import ArmMotion, Follower, Measured, Tracking
+from controller.motion.follower import ArmMotion, Follower, Measured, MotionTimeout, Tracking
 from controller.motion.tool_motion import Leg, ToolMotion
-from controller.work.cut_pose import escape_pose
-from controller.work.motion_timeout import MotionTimeout
+from controller.work.posture_search import escape_pose
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import ARM_Q
 

@@ -9,12 +9,10 @@ from controller.motion.body import Body
 from controller.motion.follower import Measured, Tracking
 from controller.motion.teleoperation import Teleoperation
 from controller.whole_body.task import Method
-from controller.work.cut_clearance import CutClearance
-from controller.work.cut_sequence import CutSequence
+from controller.work.cutting import CutSequence
 from controller.work.homing import Homing
-from controller.work.next_cut import Known, Permit
 from controller.work.point_queue import PointQueue
-from controller.work.posture_search import PostureSearch
+from controller.work.posture_search import CutClearance, Known, Permit, PostureSearch
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.config import RobotConfig

@@ -1,4 +1,6 @@
-"""Posture search for a cut: base position along the row, approach azimuth and arm posture.
+"""Tool poses of a cut, and the search for a posture: base position along the row, approach azimuth, arm posture.
+
+The blade plane is square to the cane, and the approach is from the side of the robot.
 
 The search is a generator that yields after each iteration, so that a control period runs a few iterations only.
 """
@@ -10,13 +12,84 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from controller.config import WorkConfig
-from controller.work.cut_pose import CutPoses, cut_poses
+from controller.config import HierarchyConfig, WorkConfig
+from controller.motion.surroundings import Surroundings
+from controller.whole_body.collision import CollisionModel
+from controller.work.point_queue import PointQueue, Ticket
 from rolling_panda import reasons
 from rolling_panda.errors import InputError
+from rolling_panda.messages.perception import Obstacles, PruningPoint
 from rolling_panda.messages.types import Reason
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import ARM_Q, RobotModel
+from rolling_panda.transport.inbox import Received
+
+#: An approach this close to the cane's direction is undefined.
+_LEAST_SINE = 0.2
+
+
+@dataclass(frozen=True)
+class CutPoses:
+    """The poses T_odom_tool (pin.SE3) of one cut, on one line: `clear` of the canes, `stand_off`, and the `cut`."""
+
+    clear: Any
+    stand_off: Any
+    cut: Any
+
+
+def cut_poses(
+    position: Array,
+    tangent: Array,
+    towards_row: Array,
+    stand_off: float,
+    clearance: float,
+    azimuth: float = 0.0,
+    tilt: float = 0.0,
+) -> CutPoses:
+    """The poses of a cut.
+
+    Args:
+        position: Point on the cane's axis (3, m, odom).
+        tangent: Unit vector along the cane (3, odom), either sense.
+        towards_row: Horizontal unit vector from the robot's path to the row (3, odom).
+        stand_off: Distance back from the cut (m).
+        clearance: Distance back where the tool is clear of the canes (m).
+        azimuth: Turn of the approach about the cane (rad); 0 is closest to `towards_row`.
+        tilt: Turn of the tool out of the plane square to the cane (rad); positive comes from below.
+
+    Raises:
+        InputError: The cane points at the robot, so that no approach is square to it.
+    """
+    axis = tangent / np.linalg.norm(tangent)
+    flat = towards_row - axis * float(axis @ towards_row)
+    length = float(np.linalg.norm(flat))
+    if length < _LEAST_SINE:
+        raise InputError("the cane points straight at the robot: no approach is square to it")
+    # The tool's y axis points down, so that the camera sits above the blades.
+    down = -axis if axis[2] >= 0.0 else axis
+    approach = pin.exp3(axis * azimuth) @ (flat / length)
+    side = np.cross(down, approach)
+    rotation = np.column_stack([side, down, approach])
+    if tilt:
+        rotation = pin.exp3(side * tilt) @ rotation
+        approach = rotation[:, 2]
+
+    def back(distance: float) -> Any:
+        return pin.SE3(rotation, position - distance * approach)
+
+    return CutPoses(back(clearance), back(stand_off), back(0.0))
+
+
+def escape_pose(T_odom_tool: Any, towards_row: Array, depth: float) -> Any:
+    """The tool pose after a straight retreat, so that it is `depth` (m) nearer to the robot's path; same orientation.
+
+    The retreat is along the tool's own axis where that leads away from the row, else square to the row.
+    """
+    back = -T_odom_tool.rotation[:, 2]
+    away = -float(back @ towards_row)
+    direction, cosine = (back, away) if away > 0.5 else (-towards_row, 1.0)
+    return pin.SE3(T_odom_tool.rotation, T_odom_tool.translation + direction * (depth / cosine))
+
 
 #: Positions of the cut ahead of the axle (m), in order of preference.
 OFFSETS = (0.15, 0.05, 0.25, -0.05, 0.35, -0.15, 0.45)
@@ -224,3 +297,130 @@ def completed(search: Generator[None, None, CutPlan | Unreachable]) -> CutPlan |
         except StopIteration as end:
             found: CutPlan | Unreachable = end.value
             return found
+
+
+#: Distance kept from everything where the tool is clear of the canes (m).
+CLEARANCE = 0.02
+#: Margin above the smallest distance of the guard (m): close to it the robot is very slow.
+_ROOM = 0.003
+
+
+class CutClearance:
+    """Checks cut plans before their execution. It has its own robot model, like the posture search."""
+
+    def __init__(self, robot: RobotModel, settings: HierarchyConfig) -> None:
+        """Nothing is known to stand around yet."""
+        self._settings = settings
+        self._surroundings = Surroundings(CollisionModel(robot))
+
+    def update(self, obstacles: Received[Obstacles] | None) -> None:
+        """Take the newest message; one that was taken before costs nothing."""
+        self._surroundings.update(obstacles)
+
+    def too_near(self, plan: CutPlan) -> tuple[float, Reason | None]:
+        """Largest violation of a required distance (m), with its place and parts; None without one.
+
+        Places: at the cut, at the stand-off and clear of the canes. The blades may touch the spur that is cut.
+        """
+        settings = self._settings
+        if not settings.collisions:
+            return 0.0, None
+        self._surroundings.work_at((plan.poses.cut.translation,))
+        within = max(settings.collision_distance + _ROOM, CLEARANCE)
+        worst, found = 0.0, None
+        places = (("at the cut", plan.q_cut), ("at the stand-off", plan.q_stand_off), ("clear of it", plan.q_clear))
+        for where, q in places:
+            near = self._surroundings.model.distances(q, within)
+            for distance, pair in zip(near.distance.tolist(), near.pairs, strict=True):
+                needed = settings.kept(pair) + _ROOM
+                if q is plan.q_clear:
+                    # The motion to the next cut begins and ends here.
+                    needed = max(needed, CLEARANCE)
+                if needed - distance > worst:
+                    worst = needed - distance
+                    found = reasons.too_near(where, 1e3 * distance, *pair, 1e3 * needed)
+        return worst, found
+
+
+Found = CutPlan | Unreachable | None
+Known = Callable[[Ticket], Found]
+Permit = Callable[[Ticket], Reason | None]
+
+
+class NextCut:
+    """Posture search for the next point. Call `search` for a point and `step` in each period; `found` is the result."""
+
+    def __init__(
+        self,
+        search: PostureSearch,
+        queue: PointQueue,
+        iterations: int,
+        known: Known = lambda _: None,
+        permit: Permit = lambda _: None,
+    ) -> None:
+        """Start without a point.
+
+        Args:
+            search: Posture search.
+            queue: The queue, which chooses the next point.
+            iterations: Iterations of the search in one period.
+            known: Gives the planned cut of a point, which is then used without a search.
+            permit: Gives the reason why the robot may not approach a point; None if it may.
+        """
+        self._search, self._queue, self._iterations, self._known = search, queue, iterations, known
+        self.permit = permit
+        #: Reason why the robot may not approach the next point; None without one.
+        self.refused: Reason | None = None
+        self.forget()
+
+    def forget(self) -> None:
+        """Drop the point and its search."""
+        self._ticket: Ticket | None = None
+        self._finding: Generator[None, None, CutPlan | Unreachable] | None = None
+        self.found: CutPlan | Unreachable | None = None
+
+    @property
+    def point_id(self) -> str:
+        """Id of the point; empty without one."""
+        return "" if self._ticket is None else self._ticket.point.point_id
+
+    @property
+    def accepted(self) -> PruningPoint | None:
+        """The point as accepted, which the plan is for; None without one."""
+        return None if self._ticket is None else self._ticket.accepted
+
+    def search(self, q: Array) -> bool:
+        """Search for the next accepted point from configuration q (12), unless its search is under way.
+
+        Returns:
+            False when no point is accepted, or the next one may not be gone to.
+        """
+        ticket = self._queue.next()
+        self.refused = None if ticket is None else self.permit(ticket)
+        if ticket is None or ticket.accepted is None or self.refused:
+            self.forget()
+            return False
+        if not self.stands:
+            self._ticket, self.found, self._finding = ticket, self._known(ticket), None
+            if self.found is not None:
+                return True
+            at, along = np.array(ticket.accepted.position), np.array(ticket.accepted.tangent)
+            azimuth = self._queue.approaches.of(ticket.point.point_id)
+            self._finding = self._search.find(at, along, q, azimuth)
+        return True
+
+    @property
+    def stands(self) -> bool:
+        """Whether the point is still the next one, with the same acceptance."""
+        ticket, following = self._ticket, self._queue.next()
+        return ticket is not None and following is not None and following.accepted is ticket.accepted
+
+    def step(self) -> None:
+        """Search for one period."""
+        for _ in range(self._iterations):
+            if self._finding is None:
+                return
+            try:
+                next(self._finding)
+            except StopIteration as end:
+                self.found, self._finding = end.value, None

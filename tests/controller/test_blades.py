@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from controller.config import ControllerConfig, WorkConfig
-from controller.work.blades import Blades
+from controller.work.cutting import Blades
 from rolling_panda import reasons
 
 

@@ -3,8 +3,7 @@
 import msgspec
 import pytest
 
-from controller.work.close_up import CloseUpClient
-from controller.work.cut_checks import PostCutCheck, not_as_accepted
+from controller.work.close_up import CloseUpClient, PostCutCheck, not_as_accepted
 from controller.work.point_queue import PointQueue, Ticket
 from rolling_panda import messages as m
 from rolling_panda import reasons

@@ -6,8 +6,7 @@ import pytest
 from controller.config import ControllerConfig
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.obstacle import Obstacle
-from controller.work.cut_clearance import CutClearance
-from controller.work.posture_search import CutPlan, PostureSearch, Unreachable, completed
+from controller.work.posture_search import CutClearance, CutPlan, PostureSearch, Unreachable, completed
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import Capsule, Obstacles
 from rolling_panda.model.robot import ARM_Q, RobotModel

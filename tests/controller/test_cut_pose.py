@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controller.work.cut_pose import cut_poses, escape_pose
+from controller.work.posture_search import cut_poses, escape_pose
 from rolling_panda.errors import InputError
 
 LEFT = np.array([0.0, 1.0, 0.0])

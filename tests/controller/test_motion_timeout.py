@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from controller.motion.follower import Tracking
-from controller.work.motion_timeout import MotionTimeout, missed
+from controller.motion.follower import MotionTimeout, Tracking, missed
 from rolling_panda import reasons
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.reasons import text_of

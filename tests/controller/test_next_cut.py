@@ -1,8 +1,7 @@
 import numpy as np
 
-from controller.work.next_cut import NextCut
 from controller.work.point_queue import PointQueue
-from controller.work.posture_search import Unreachable
+from controller.work.posture_search import NextCut, Unreachable
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from tests.controller.test_core_work import CONFIG, point

@@ -11,7 +11,7 @@ from controller.config import ControllerConfig
 from controller.motion.tool_motion import ToolMotion
 from controller.motion.trajectory import PEAK_VELOCITY
 from controller.planning.order import length, shortest, travel_times
-from controller.work.approach_segments import ApproachSegments
+from controller.work.cutting import ApproachSegments
 from controller.work.posture_search import PostureSearch, completed
 from rolling_panda.model.robot import ARM_Q, RobotModel
 from tests.support.controller_config import controller_config

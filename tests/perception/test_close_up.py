@@ -12,7 +12,7 @@ from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
 from bridge.sim.vineyard.row import Row
 from bridge.sim.vineyard.truth import RightCut, judge
-from controller.work.cut_pose import cut_poses
+from controller.work.posture_search import cut_poses
 from perception.config import PerceptionConfig
 from perception.segmentation.frame import View, decode_frame
 from perception.segmentation.segmenter import LabelImageSegmenter

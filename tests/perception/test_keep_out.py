@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from controller.config import HierarchyConfig
 from controller.whole_body.collision_geometry import _TOOL_CAPSULES, BLADES
-from controller.work.cut_clearance import _ROOM
+from controller.work.posture_search import _ROOM
 from perception.config import RuleConfig
 from perception.rules.keep_out import frame_keep_out, map_keep_out, wire_in_image
 from perception.segmentation.frame import View

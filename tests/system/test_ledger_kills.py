@@ -32,7 +32,7 @@ from controller.ledger.store import Ledger
 from controller.ledger.start import restored
 from controller.ledger.writer import LedgerWriter
 from controller.loop import controller_runner
-from controller.work.queue_requests import QueueRequests
+from controller.work.point_queue import QueueRequests
 from controller.work.point_queue import PointQueue
 from rolling_panda import messages as m
 from rolling_panda.reasons import said, text_of

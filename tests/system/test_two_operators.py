@@ -24,8 +24,7 @@ from controller.config import WorkConfig
 from controller.ledger.check import reading, verify
 from controller.ledger.journal import EventLogger, Journal, LedgerState, RequestRow, TicketRow
 from controller.ledger.store import Entry, Ledger, read
-from controller.work.point_queue import PointQueue
-from controller.work.queue_requests import QueueRequests
+from controller.work.point_queue import PointQueue, QueueRequests
 from rolling_panda import messages as m
 from rolling_panda.reasons import said
 from tests.support.fake_wire import FakeWire

@@ -23,6 +23,9 @@ def test_a_click_into_the_view_asks_for_a_point_only_while_points_are_placed(pag
     server.answers["/api/points/by-hand"] = PLACED
     line = p.PickRay(origin=(0.0, -0.5, 1.2), direction=(0.0, 1.0, 0.0))
     server.tell(line)
+    # A later message, whose arrival can be seen: the click has come too.
+    server.tell(p.PageEvents(events=(server.event(2, "warning", "said after the click"),)))
+    expect(page.locator("#log li").last).to_contain_text("said after the click")
     expect(page.locator("rp-placing")).to_be_hidden()
     page.locator("#add-by-hand").click()
     until(page, lambda: p.PlaceByHand(active=True) in server.said)

@@ -10,7 +10,7 @@ from bridge.core.interface import Measurement
 from controller.motion.setpoints import Setpoints
 from controller.motion.teleoperation import Teleoperation
 from controller.supervision.modes import Event
-from controller.work.blades import Blades
+from controller.work.cutting import Blades
 from controller.work.movement import MotionResult
 from rolling_panda import reasons
 from rolling_panda.model.robot import RobotModel

@@ -1,33 +1,168 @@
-"""Stages of the cut sequence, one class each, with the data that the stage needs.
+"""The cut sequence: posture search, travel, approach, advance, cut, retreat, next cut.
 
-`step` answers with the stage of the next period and the result of this one.
+Between cuts the tool keeps `clearance` from the canes. It moves into them and out of them on one straight line; near
+the cut (`arm_only`) the base is at rest. The posture search for the next cut runs while the blades close, so that the
+retreat from one cut blends into the motion to the next.
+
+Each stage is a class with the data that it needs. Its `step` answers with the stage of the next period and the result
+of this one.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
-from controller.config import ControllerConfig
-from controller.motion.follower import Follower, Measured, Tracking
+from controller.config import ControllerConfig, WorkConfig
+from controller.motion.follower import Follower, Measured, MotionTimeout, Tracking, missed
 from controller.motion.tool_motion import Leg, ToolMotion
 from controller.whole_body.saturation import Saturation
-from controller.work.approach_segments import ApproachSegments
-from controller.work.blades import Blades
-from controller.work.close_up import CloseUpClient
-from controller.work.cut_checks import PostCutCheck, camera_ready, not_as_accepted
-from controller.work.cut_pose import escape_pose
+from controller.work.close_up import CloseUpClient, PostCutCheck, camera_ready, not_as_accepted
 from controller.work.homing import Withdrawal
-from controller.work.motion_timeout import MotionTimeout, missed
-from controller.work.next_cut import NextCut
 from controller.work.point_queue import PointQueue
-from controller.work.posture_search import CutPlan, Unreachable
+from controller.work.posture_search import CutPlan, Known, NextCut, Permit, PostureSearch, Unreachable, escape_pose
 from controller.work.step_result import StepResult
 from controller.work.survey import Survey
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda import reasons
+from rolling_panda.messages.perception import CloseUpResult
+from rolling_panda.messages.types import Reason
 from rolling_panda.model.differential_drive import Array
-from rolling_panda.model.robot import ARM_XI
+from rolling_panda.model.robot import ARM_Q, ARM_XI
+
+#: A cut command is repeated this often until the bridge has seen it (s).
+_REPEAT_S = 0.05
+_OUTCOMES: dict[str, Reason] = {
+    "DONE": reasons.cutter_cut(),
+    "FAILED_NOT_CUT": reasons.cutter_missed(),
+    "UNKNOWN": reasons.cutter_unsure(),
+}
+
+
+Ended = Callable[[str, m.Outcome, Reason, float], None]
+
+
+@dataclass
+class _Cut:
+    """A cut in progress: the blades may have moved."""
+
+    point_id: str
+    cut_id: str
+    deadline: float
+    record: int
+    asked_at: float = -math.inf
+
+
+class Blades:
+    """Orders cuts, one at a time, and passes the outcome of each to the queue."""
+
+    def __init__(self, config: WorkConfig, queue: PointQueue, run_id: str, ended: Ended | None = None) -> None:
+        """Bind the parts.
+
+        Args:
+            config: Section `[controller.work]`.
+            queue: The queue, which gets the outcomes.
+            run_id: Prefix that makes the cut ids of this start unique.
+            ended: Called with the cutter's report in place of the queue: point, outcome, reason, time.
+        """
+        self._ended = ended
+        self._timeout_s, self._queue, self._run_id = config.cut_timeout_s, queue, run_id
+        self._cuts = 0
+        self._cut: _Cut | None = None
+
+    @property
+    def busy(self) -> bool:
+        """Whether a cut has been asked for and how it ends is not known yet: the blades may be closing."""
+        return self._cut is not None
+
+    def start(self, point_id: str, now: float) -> None:
+        """Intend a cut at a point; no command is sent before that intent is durable."""
+        self._cuts += 1
+        cut_id = f"{self._run_id}-{self._cuts}"
+        self._cut = _Cut(point_id, cut_id, now + self._timeout_s, self._queue.begin_cut(point_id, cut_id))
+
+    def command(self, now: float) -> tuple[str, str] | None:
+        """(cut_id, point_id) to command in this period; None between repetitions and before the intent is durable."""
+        cut = self._cut
+        if cut is None or now - cut.asked_at < _REPEAT_S or not self._queue.recorded(cut.record):
+            return None
+        cut.asked_at = now
+        return cut.cut_id, cut.point_id
+
+    def watch(self, bridge: m.BridgeState, now: float) -> tuple[Reason, ...]:
+        """Update the cut from the bridge's state; returns what is logged."""
+        cut = self._cut
+        if cut is None:
+            return ()
+        if bridge.cut_id == cut.cut_id and bridge.outcome:
+            self._cut = None
+            why = _OUTCOMES[bridge.outcome]
+            if self._ended is not None:
+                self._ended(cut.point_id, bridge.outcome, why, now)
+            else:
+                self._queue.resolve(cut.point_id, bridge.outcome, why)
+            told = reasons.cut_done if bridge.outcome == "DONE" else reasons.cut_ended
+            return (told(cut.point_id, why),)
+        if now > cut.deadline and cut.asked_at == -math.inf:
+            self._cut = None
+            why = reasons.no_order_given(self._timeout_s)
+            self._queue.resolve(cut.point_id, "FAILED_NOT_CUT", why)
+            return (reasons.point_not_cut(cut.point_id, why),)
+        if now > cut.deadline:
+            self._cut = None
+            why = reasons.no_cutter_report(self._timeout_s)
+            self._queue.resolve(cut.point_id, "UNKNOWN", why)
+            return (reasons.outcome_unknown(cut.point_id, why),)
+        return ()
+
+
+class ApproachSegments:
+    """Segments for a method that blends them, or for one that stops between them."""
+
+    def __init__(self, config: WorkConfig, flows: bool) -> None:
+        """Bind the configuration."""
+        self._config, self._flows = config, flows
+
+    def to(self, plan: CutPlan, T_odom_tool: Any, q: Array) -> tuple[Leg, ...]:
+        """Segments from a tool pose (pin.SE3) at q (12) to a cut, or to the pose of a close-up before it."""
+        there = self.there(plan, T_odom_tool, q)
+        return there if self._config.pre_cut_check else (*there, self.into(plan))
+
+    def there(self, plan: CutPlan, T_odom_tool: Any, q: Array) -> tuple[Leg, ...]:
+        """From a pose of the tool (pin.SE3) at q (12) to clear of the canes before a cut."""
+        speed = self._config.tool_speed
+        if self._flows:
+            return (Leg(plan.poses.clear, plan.q_clear, speed),)
+        # The base moves with the arm at rest; then the arm moves alone.
+        q_there = at_base(q, plan.q_clear)
+        carried = _base_pose(q_there) * _base_pose(q).inverse() * T_odom_tool
+        return Leg(carried, q_there, speed), Leg(plan.poses.clear, plan.q_clear, speed, math.inf)
+
+    def into(self, plan: CutPlan) -> Leg:
+        """Straight in, from clear of the canes to the cut."""
+        config = self._config
+        return Leg(plan.poses.cut, plan.q_cut, config.advance_speed, config.arm_only if self._flows else math.inf)
+
+    def out(self, plan: CutPlan, q: Array) -> Leg:
+        """Straight back, from the cut to clear of the canes with the base at q (12)."""
+        arm_only = self._config.arm_only if self._flows else math.inf
+        return Leg(plan.poses.clear, at_base(plan.q_clear, q), self._config.tool_speed, frozen_until=arm_only)
+
+
+def at_base(q_arm: Array, q_base: Array) -> Array:
+    """The arm posture of one configuration (12) with the base of another."""
+    out = q_base.copy()
+    out[ARM_Q] = q_arm[ARM_Q]
+    return out
+
+
+def _base_pose(q: Array) -> Any:
+    return pin.SE3(pin.exp3(np.array([0.0, 0.0, q[2]])), np.array([q[0], q[1], 0.0]))
+
 
 #: Smaller refinements of a point by perception are ignored (m).
 _REFINED = 0.0003
@@ -527,3 +662,125 @@ def _shift(motion: ToolMotion, position: Array) -> None:
     moved = position - motion.goal.translation
     if float(np.linalg.norm(moved)) > _REFINED:
         motion.shift(moved)
+
+
+#: Largest number of pictures of one close-up.
+_PICTURES = 2
+
+
+class CutSequence:
+    """Executes the queue. Call `start` once, `step` in each period in AUTO, and `abort` in other modes."""
+
+    def __init__(
+        self,
+        config: ControllerConfig,
+        search: PostureSearch,
+        follower: Follower,
+        saturation: Saturation,
+        queue: PointQueue,
+        run_id: str,
+        known: Known = lambda _: None,
+        permit: Permit = lambda _: None,
+    ) -> None:
+        """Bind the parts.
+
+        `run_id` makes the cut ids of this start unique. `known` gives the planned cut of a point, and
+        `permit` the reason why the robot may not approach it.
+        """
+        close_ups = CloseUpClient(config.work.close_up_timeout_s, _PICTURES)
+        check = PostCutCheck(queue, close_ups, config.work.post_cut_check)
+        self._parts = Parts(
+            config,
+            follower,
+            saturation,
+            queue,
+            ApproachSegments(config.work, follower.flows),
+            close_ups,
+            check,
+            Blades(config.work, queue, run_id, check.start),
+            NextCut(search, queue, config.search_steps_each, known, permit),
+        )
+        self._stage: Stage = Rest(self._parts)
+        self._places: tuple[Array, ...] = ()
+
+    @property
+    def phase(self) -> m.Phase:
+        """Phase on the wire."""
+        return self._stage.phase
+
+    @property
+    def active(self) -> str:
+        """Current point of the work; empty without one."""
+        return self._stage.point_id
+
+    @property
+    def in_canes(self) -> str:
+        """Point that the tool hides from the camera now; empty without one."""
+        return self._stage.point_id if self._stage.in_canes else ""
+
+    @property
+    def plan(self) -> CutPlan | None:
+        """Poses and postures of the cut under way; None while there is none."""
+        return self._stage.plan
+
+    @property
+    def places(self) -> tuple[Array, ...]:
+        """Cuts that the motion under way begins or ends at (3, m, odom): the blades may touch the spurs there."""
+        return self._places
+
+    @property
+    def close_up_s(self) -> float:
+        """Time from the request of the last close-up to its result (s)."""
+        return self._parts.close_ups.took_s
+
+    def clear_of_canes(self, q: Array) -> Array:
+        """Configuration (12) clear of the canes before the next point, from q (12); q itself outside the canes."""
+        plan = self._stage.plan
+        return at_base(plan.q_clear, q) if self._stage.in_canes and plan is not None else q
+
+    @property
+    def cutting(self) -> bool:
+        """Whether a cut has been asked for and how it ends is not known yet: the blades may be closing."""
+        return self._parts.blades.busy
+
+    def start(self, survey: intents.Survey | intents.LookAgain | None = None) -> None:
+        """Start with getting the tool clear of the canes, or a survey."""
+        parts = self._parts
+        # Since a plan was made the robot may have been moved by hand.
+        parts.next_cut.forget()
+        if survey is None:
+            self._stage = Escape(parts)
+        else:
+            self._stage = Surveying(parts, Survey(parts.config, parts.follower, parts.saturation, parts.queue, survey))
+
+    def finish_cut_and_pause(self, why: m.Reason | None) -> None:
+        """With a reason: begin no further cut, leave the canes and pause. None continues the work."""
+        self._parts.ending = why
+
+    def abort(self) -> None:
+        """Abort the work. A cut in progress is still monitored, and an accepted point stays accepted."""
+        self._stage = Rest(self._parts)
+
+    def watch(self, bridge: m.BridgeState, close_up: CloseUpResult | None, now: float) -> tuple[m.Reason, ...]:
+        """Process the end of a cut and the newest close-up, in every mode; returns what is logged."""
+        parts = self._parts
+        if close_up is not None:
+            parts.close_ups.update(close_up, now)
+        return *parts.blades.watch(bridge, now), *parts.post_cut_check.step(now)
+
+    def picture(self, now: float) -> tuple[int, str] | None:
+        """Number and point of the picture to ask for in this period; None when none is due."""
+        return self._parts.close_ups.due(now)
+
+    def step(self, robot: Measured, now: float) -> StepResult:
+        """One period of work.
+
+        Args:
+            robot: Measured robot.
+            now: Monotonic time (s).
+        """
+        self._stage, result = self._stage.step(robot, now)
+        if plans := self._stage.plans:
+            # While the tool leaves the canes there is no plan; it is still near the last cut.
+            self._places = tuple(plan.poses.cut.translation for plan in plans)
+        return result
