@@ -8,7 +8,7 @@ from pathlib import Path
 
 from bridge.config import BridgeConfig
 from bridge.core.bridge import BridgeCore
-from bridge.core.cut_memory import CutFile
+from bridge.core.cut_orders import CutFile
 from bridge.core.state_memory import Remembered, begin_anew, open_memory
 from bridge.loop import bridge_runner
 from bridge.real.config import RealConfig

@@ -10,9 +10,8 @@ from controller.core import Controller
 from controller.ledger.start import restored, start_record
 from controller.ledger.store import Ledger
 from controller.ledger.writer import LedgerWriter
-from controller.loop import controller_runner
+from controller.loop import controller_runner, open_stop_file
 from controller.planner_process import PlannerProcess
-from controller.stop_file import open_stop_file
 from rolling_panda.config import RobotConfig, load_section
 from rolling_panda.runtime.process import ProcessContext, run_process
 from rolling_panda.runtime.scheduling import freeze_heap, release_library

@@ -1,23 +1,84 @@
 """The controller as a process: its core with the ledger, the planner and the file of the latched stops."""
 
 import sys
+from collections import deque
 from collections.abc import Sequence
-from typing import Protocol
+from pathlib import Path
+from typing import Any, Protocol
 
-from controller.commit_barrier import CommitBarrier
 from controller.ledger.journal import LedgerState, Records
 from controller.ledger.writer import LedgerWriter
 from controller.planner_process import PlannerProcess
 from controller.planning.preview_plan import PreviewRequest
 from controller.planning.work_plan import PlanRequest
-from controller.stop_file import Stops
 from rolling_panda import messages as m
-from rolling_panda.messages.supervision import ControlState, PreviewMotion, PreviewState, StopState
-from rolling_panda.reasons import text_of
-from rolling_panda.runtime.latest_file import KeptValue
+from rolling_panda import reasons
+from rolling_panda.messages.supervision import ControlState, PreviewMotion, PreviewState, StopRecord, StopState
+from rolling_panda.reasons import text_of, with_reason
+from rolling_panda.runtime.latest_file import KeptValue, LatestFileWriter
+from rolling_panda.runtime.state_folder import read_kept
 from rolling_panda.topics import REPORT
 from rolling_panda.transport.inbox import Inbox, Reply
 from rolling_panda.transport.runner import Runner, Standby, Wire
+
+_STOPS_NAME = "controller-stops.json"
+#: The newest first.
+Stops = tuple[StopRecord, ...]
+
+
+def open_stop_file(folder: Path) -> KeptValue[Stops]:
+    """The latched stops kept in a folder.
+
+    Raises:
+        InputError: They cannot be read: a controller that does not know what was stopped must not start.
+    """
+    path = folder / _STOPS_NAME
+    stops = read_kept(path, Stops, (), "which stops were latched", upgrade=_upgraded)
+    return KeptValue(stops, LatestFileWriter(path))
+
+
+def _upgraded(stops: Any) -> Any:
+    return [with_reason(stop) for stop in stops] if isinstance(stops, list) else stops
+
+
+#: Time limit of a record; after it the answer is "not recorded" (s).
+_PATIENCE_S = 0.6
+
+
+class CommitBarrier:
+    """Queue of messages that wait for their records to be durable, in the order of the records. No clock."""
+
+    def __init__(self) -> None:
+        """Start with nothing to say."""
+        self._waiting: deque[tuple[int, float, object]] = deque()
+
+    def hold(self, number: int, now: float, message: object) -> None:
+        """Keep a message until all records up to `number` are durable."""
+        self._waiting.append((number, now, message))
+
+    def settle(self, ledger: LedgerState, now: float) -> list[object]:
+        """The messages whose records are durable. A reply without a record becomes a refusal with the cause."""
+        out = []
+        while self._waiting:
+            number, since, message = self._waiting[0]
+            why = None
+            if number > ledger.durable:
+                if ledger.failure is not None:
+                    why = ledger.failure
+                elif now - since > _PATIENCE_S:
+                    why = reasons.ledger_silent(now - since)
+                else:
+                    break
+            self._waiting.popleft()
+            out.append(message if why is None else _unrecorded(message, reasons.decision_unrecorded(why)))
+        return out
+
+
+def _unrecorded(message: object, why: m.Reason) -> object:
+    if not isinstance(message, Reply) or message.answer is None or not message.answer.ok:
+        return message
+    return Reply(message.request, m.Answer(ok=False, reason=why))
+
 
 #: Longest time that the loop's clock advances in one iteration, in periods.
 _LONGEST_TURN = 5

@@ -96,7 +96,7 @@ _ALL: Final = (
     Limit("real.arm.fade_s", 0.07),
     Limit("real.arm.deadline_s", 0.2),
     Limit("real.cutter.timeout_s", 2.0),
-    Limit("silence that frees the token", 1.0, "bridge/core/fence.py:SILENT_S"),
+    Limit("silence that frees the token", 1.0, "bridge/core/validator.py:SILENT_S"),
     # The controller's age limits.
     Limit("controller.rate_hz", 100.0, rate=True),
     Limit("controller.supervision.joints_max_age_s", 0.2),

@@ -17,7 +17,7 @@ from benchmarks.control.base_path import BasePlanner
 from benchmarks.control.path import PathPlanner, Planned, Refused, Stand
 from benchmarks.control.plan_limits import PlanLimits
 from benchmarks.control.rest_to_rest import durations
-from controller.motion.trajectory import Rates
+from controller.motion.tool_motion import Rates
 from controller.whole_body.collision import CollisionModel
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import ARM_Q, RobotModel

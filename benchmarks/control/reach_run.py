@@ -17,7 +17,7 @@ from benchmarks.control.plan_limits import plan_limits
 from benchmarks.control.reach_judge import POSITION, ROTATION, BaseBounds, Trajectory, goal_error
 from controller.config import ControllerConfig, HierarchyConfig, MotionConfig, WholeBodyConfig, WorkConfig
 from controller.motion.follower import tool_error
-from controller.motion.trajectory import PoseTrajectory, Rates
+from controller.motion.tool_motion import PoseTrajectory, Rates
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.registry import make_method
 from controller.whole_body.task import IkProblem, Method, Posture, Solution, ToolTask

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller.motion.trajectory import Rates
+from controller.motion.tool_motion import Rates
 from rolling_panda.model.differential_drive import Array
 
 #: Shorter distances need no motion: they are covered at once, without velocity.

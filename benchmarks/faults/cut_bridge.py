@@ -16,7 +16,7 @@ import numpy as np
 
 from bridge.config import BridgeConfig
 from bridge.core.bridge import TICK_S, BridgeCore
-from bridge.core.cut_memory import CutFile
+from bridge.core.cut_orders import CutFile
 from bridge.core.interface import CutterState, Measurement, Setpoint
 from bridge.core.odometer import Odometer
 from bridge.core.picture import Picture

@@ -10,20 +10,16 @@ import numpy as np
 
 from bridge.config import BridgeConfig
 from bridge.core.camera_trigger import CameraTrigger, Posture
-from bridge.core.cut_memory import CutMemory
-from bridge.core.cut_orders import FORGETFUL, CutOrders
-from bridge.core.fence import SILENT_S, Fence
+from bridge.core.cut_orders import FORGETFUL, CutMemory, CutOrders
 from bridge.core.interface import Measurement, Robot, Setpoint
 from bridge.core.latch import StopLatch, told
-from bridge.core.limiter import Limiter
+from bridge.core.limiter import Limiter, Watchdog
 from bridge.core.odometer import Odometer
 from bridge.core.refusals import Refusals
 from bridge.core.robot_faults import RobotFaults, draw_id
-from bridge.core.robot_time import TimeRatio
-from bridge.core.round_trip import RoundTrip
+from bridge.core.robot_time import RoundTrip, TimeRatio
 from bridge.core.state_memory import Remembered
-from bridge.core.validator import CommandValidator
-from bridge.core.watchdog import Watchdog
+from bridge.core.validator import SILENT_S, CommandValidator, Fence
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.messages.perception import Capsule, CloseUpRequest, Scenery

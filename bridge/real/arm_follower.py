@@ -10,8 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bridge.core.limiter import Limiter
-from bridge.core.watchdog import Watchdog
+from bridge.core.limiter import Limiter, Watchdog
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import ARM_XI, Limits
 

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from bridge.config import BridgeConfig
 from bridge.core.bridge import TICK_S, BridgeCore
-from bridge.core.cut_memory import CutMemory
+from bridge.core.cut_orders import CutMemory
 from bridge.core.odometer import Odometer
 from bridge.core.state_memory import Remembered
 from bridge.real.config import CameraConfig, CutterConfig, RealConfig

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bridge.core.watchdog import Watchdog
+from bridge.core.limiter import Watchdog
 from bridge.real import ros_messages as ros
 from bridge.real.config import BaseConfig
 from rolling_panda import reasons

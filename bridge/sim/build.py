@@ -5,7 +5,7 @@ from typing import Literal
 
 from bridge.config import BridgeConfig
 from bridge.core.bridge import TICK_S, BridgeCore
-from bridge.core.cut_memory import CutMemory
+from bridge.core.cut_orders import CutMemory
 from bridge.core.odometer import Odometer
 from bridge.core.state_memory import Remembered
 from bridge.sim.camera.config import CameraConfig

@@ -8,8 +8,7 @@ import pinocchio as pin
 from msgspec import Struct
 
 from controller.config import MotionConfig, TeleoperationConfig
-from controller.motion.tool_motion import ToolMotion
-from controller.motion.trajectory import Rates, ToolState, quintic
+from controller.motion.tool_motion import Rates, ToolMotion, ToolState, quintic
 from controller.whole_body.compiled import MATRIX, NOTHING, NUMBER, VECTOR, compiled
 from controller.whole_body.task import ActuatorTask, BaseMode, IkProblem, Method, Posture, Solution, ToolTask
 from rolling_panda import reasons

@@ -11,7 +11,7 @@ import numpy as np
 from controller.config import HierarchyConfig
 from controller.ledger.journal import Journal, PreviewRequiredRow
 from controller.planning.path_watch import PathWatch
-from controller.planning.plan_validity import approaches_changed, away_from
+from controller.planning.plan_manager import approaches_changed, away_from
 from controller.planning.preview_plan import Preview, PreviewRequest, motion_message, state_message
 from controller.work.point_queue import PointQueue, Ticket
 from controller.work.posture_search import CutPlan

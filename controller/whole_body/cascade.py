@@ -19,9 +19,15 @@ import numpy as np
 from msgspec import Struct
 from scipy.linalg.lapack import dsyev
 
-from controller.whole_body.compiled import FLAG, MATRIX, NOTHING, NUMBER, PACKED, VECTOR, compiled
-from controller.whole_body.small_matrices import (
+from controller.whole_body.compiled import (
+    FLAG,
+    MATRIX,
+    NOTHING,
+    NUMBER,
+    PACKED,
+    VECTOR,
     cholesky,
+    compiled,
     inverse_norm_squared,
     orthogonalize,
     solve_cholesky,

@@ -7,8 +7,7 @@ singularities of the arm.
 import numpy as np
 from msgspec import Struct
 
-from controller.whole_body.compiled import MATRIX, NUMBER, VECTOR, compiled
-from controller.whole_body.small_matrices import cholesky, solve_cholesky
+from controller.whole_body.compiled import MATRIX, NUMBER, VECTOR, cholesky, compiled, solve_cholesky
 from rolling_panda.model.differential_drive import NXI, Array
 from rolling_panda.model.robot import ARM_Q, ARM_XI
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from benchmarks.control.rest_to_rest import durations, quickest
-from controller.motion.trajectory import Rates
+from controller.motion.tool_motion import Rates
 
 rate = st.floats(0.05, 20.0)
 

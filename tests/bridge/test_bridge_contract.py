@@ -9,10 +9,9 @@ import pytest
 
 from bridge.config import BridgeConfig
 from bridge.core.bridge import TICK_S, BridgeCore
-from bridge.core.fence import HELD, OLD_EPOCH, UNKNOWN_EPOCH
 from bridge.core.odometer import Odometer
 from bridge.core.robot_time import RealTime, SteppedTime
-from bridge.core.validator import OLD_SEQUENCE, TOO_OLD
+from bridge.core.validator import HELD, OLD_EPOCH, OLD_SEQUENCE, TOO_OLD, UNKNOWN_EPOCH
 from bridge.sim.robot.robot import SimulatedRobot
 from bridge.sim.vineyard.row import Row
 from rolling_panda import messages as m

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from bridge.config import BridgeConfig, OdometryConfig
 from bridge.core.bridge import TICK_S, BridgeCore
-from bridge.core.cut_memory import ForLife
+from bridge.core.cut_orders import ForLife
 from bridge.core.interface import NO_CUT, Measurement, Setpoint
 from bridge.core.odometer import Odometer
 from bridge.core.picture import Picture

@@ -9,11 +9,10 @@ import pytest
 from bridge.config import BridgeConfig
 from bridge.core.bridge import MOVING_CUT, TICK_S, BridgeCore, BridgeOutputs
 from bridge.core.cut_orders import BUSY
-from bridge.core.fence import HELD, MOVING
 from bridge.core.interface import Measurement
 from bridge.core.picture import Picture
 from bridge.core.state_memory import Remembered
-from bridge.core.validator import OLD_SEQUENCE
+from bridge.core.validator import HELD, MOVING, OLD_SEQUENCE
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.messages.perception import Capsule

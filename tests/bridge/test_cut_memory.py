@@ -12,9 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from bridge.core import cut_memory
-from bridge.core.cut_memory import FILE, CutFile
-from bridge.core.cut_orders import FORGETFUL, CutOrders
+from bridge.core import cut_orders
+from bridge.core.cut_orders import FILE, FORGETFUL, CutFile, CutOrders
 from rolling_panda import reasons
 from rolling_panda.errors import InputError
 from rolling_panda.messages import Reason
@@ -148,7 +147,7 @@ def test_the_memory_of_cuts_survives_a_power_failure_and_keeps_no_file_open(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     synced: list[Path] = []
-    monkeypatch.setattr(cut_memory, "sync_folder", synced.append)
+    monkeypatch.setattr(cut_orders, "sync_folder", synced.append)
     memory = CutFile(tmp_path)
     assert synced == [tmp_path], "the name of a new file is in its folder, which has to be on the disk too"
     before = len(os.listdir("/proc/self/fd"))
@@ -163,7 +162,7 @@ def test_the_disk_waits_for_the_control_loop_and_keeps_no_process_alive(
 ) -> None:
     given: list[tuple[str, str]] = []
     monkeypatch.setattr(
-        cut_memory, "set_priority", lambda priority: given.append((priority, threading.current_thread().name))
+        cut_orders, "set_priority", lambda priority: given.append((priority, threading.current_thread().name))
     )
     before = set(threading.enumerate())
     memory = CutFile(tmp_path)
@@ -196,7 +195,7 @@ def test_a_folder_that_cannot_be_used_is_named(tmp_path: Path) -> None:
 BRIDGE = """
 import os, sys, time
 from pathlib import Path
-from bridge.core.cut_memory import CutFile
+from bridge.core.cut_orders import CutFile
 from bridge.core.cut_orders import CutOrders
 from rolling_panda.messages import CutCommand
 

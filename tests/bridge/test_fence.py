@@ -12,11 +12,11 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 
 from bridge.__main__ import main
 from bridge.config import BridgeConfig, OdometryConfig
-from bridge.core import fence as f
+from bridge.core import validator as f
 from bridge.core.bridge import TICK_S, BridgeCore
-from bridge.core.fence import SILENT_S, Fence
 from bridge.core.odometer import Odometer
 from bridge.core.state_memory import Remembered, begin_anew, open_memory
+from bridge.core.validator import SILENT_S, Fence
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.errors import InputError, MessageError

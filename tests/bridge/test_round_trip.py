@@ -1,6 +1,6 @@
 import pytest
 
-from bridge.core.round_trip import RoundTrip
+from bridge.core.robot_time import RoundTrip
 
 
 def test_it_tells_the_median_and_the_worst_of_the_last_second() -> None:

@@ -5,10 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridge.core import fence as f
+from bridge.core import validator as f
 from bridge.core import validator as g
-from bridge.core.fence import Fence
-from bridge.core.validator import CommandValidator
+from bridge.core.validator import CommandValidator, Fence
 from rolling_panda.messages.robot import CutCommand, MotionCommand, TokenRequest
 from rolling_panda.model.robot import RobotModel
 

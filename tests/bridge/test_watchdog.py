@@ -1,4 +1,4 @@
-from bridge.core.watchdog import Watchdog
+from bridge.core.limiter import Watchdog
 
 
 def test_a_setpoint_is_followed_then_fades_then_the_watchdog_trips() -> None:

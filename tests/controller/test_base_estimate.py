@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from controller.motion.base_estimate import BaseEstimate, wheels_ahead
+from controller.motion.body import BaseEstimate, wheels_ahead
 from rolling_panda import messages as m
 from rolling_panda.model.differential_drive import DifferentialDrive
 from tests.support.driven_base import DrivenBase

@@ -1,7 +1,7 @@
 """What rests on a record is said when the record is durable, in order, or with the reason why it is not."""
 
-from controller.commit_barrier import CommitBarrier
 from controller.ledger.journal import LedgerState
+from controller.loop import CommitBarrier
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.transport.inbox import Reply, Request

@@ -6,14 +6,13 @@ import time
 import msgspec
 import pytest
 
-from bridge.core.fence import Fence
+from bridge.core.validator import Fence
 from controller.config import ControllerConfig
 from controller.core import Controller
 from controller.ledger.check import reading, verify
 from controller.ledger.store import Ledger, read
 from controller.ledger.writer import LedgerWriter
-from controller.loop import controller_runner
-from controller.stop_file import open_stop_file
+from controller.loop import controller_runner, open_stop_file
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda import reasons

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from controller.planning.plan_validity import ObstacleWatch, place_changed, points_changed
+from controller.planning.plan_manager import ObstacleWatch, place_changed, points_changed
 from controller.planning.work_plan import PlanRequest, WorkPlan
 from controller.work.point_queue import Ticket
 from rolling_panda import reasons

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controller.whole_body.small_matrices import (
+from controller.whole_body.compiled import (
     cholesky,
     inverse_norm_squared,
     orthogonalize,

@@ -10,9 +10,8 @@ from controller.whole_body.collision import CollisionModel
 from controller.whole_body.guards.collision import CollisionGuard
 from controller.whole_body.nullspace import Nullspace
 from controller.whole_body.obstacle import Obstacle
-from controller.whole_body.registry import make_method
+from controller.whole_body.registry import SpeedScaling, allowed_speed_scale, make_method
 from controller.whole_body.saturation import Saturation
-from controller.whole_body.speed_scaling import SpeedScaling, allowed_speed_scale
 from controller.whole_body.task import IkProblem, Inequalities, Posture, ToolTask
 from rolling_panda.model.robot import ARM_Q, RobotModel
 from tests.support.controller_config import controller_config

@@ -2,7 +2,7 @@ import json
 
 import pytest
 
-from controller.stop_file import open_stop_file
+from controller.loop import open_stop_file
 from rolling_panda.errors import InputError
 from rolling_panda.messages.supervision import StopRecord
 from rolling_panda.reasons import said

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from controller.motion.tracking_error import TrackingErrorMonitor
+from controller.motion.body import TrackingErrorMonitor
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.reasons import text_of

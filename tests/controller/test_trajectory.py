@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from controller.motion.trajectory import Correction, PoseTrajectory, Progress, Rates, quintic
+from controller.motion.tool_motion import Correction, PoseTrajectory, Progress, Rates, quintic
 
 TRANSLATION, ROTATION = Rates(0.3, 0.6, 4.0), Rates(0.8, 1.8, 12.0)
 seeds = st.integers(0, 2**32 - 1)

@@ -8,9 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from controller.config import ControllerConfig
-from controller.motion.tool_motion import ToolMotion
-from controller.motion.trajectory import PEAK_VELOCITY
-from controller.planning.order import length, shortest, travel_times
+from controller.motion.tool_motion import PEAK_VELOCITY, ToolMotion
+from controller.planning.cuts import length, shortest, travel_times
 from controller.work.cutting import ApproachSegments
 from controller.work.posture_search import PostureSearch, completed
 from rolling_panda.model.robot import ARM_Q, RobotModel

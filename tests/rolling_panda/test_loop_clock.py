@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rolling_panda.transport.loop_clock import LoopClock
+from rolling_panda.transport.runner import LoopClock
 
 gaps = st.lists(st.floats(0.0, 10.0), max_size=30)
 

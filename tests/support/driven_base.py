@@ -6,7 +6,7 @@ import pinocchio as pin
 from bridge.config import OdometryConfig
 from bridge.core.odometer import Odometer
 from controller.config import ControllerConfig
-from controller.motion.base_estimate import BaseEstimate, wheels_ahead
+from controller.motion.body import BaseEstimate, wheels_ahead
 from controller.motion.follower import Follower, Measured
 from controller.motion.tool_motion import Leg, ToolMotion
 from controller.whole_body.registry import make_method

@@ -15,8 +15,7 @@ from controller.core import Controller
 from controller.ledger.start import restored
 from controller.ledger.store import Ledger
 from controller.ledger.writer import LedgerWriter
-from controller.loop import controller_runner
-from controller.stop_file import open_stop_file
+from controller.loop import controller_runner, open_stop_file
 from rolling_panda.config import RobotConfig, TransportConfig
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.transport.zenoh import Transport

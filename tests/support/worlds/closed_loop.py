@@ -8,7 +8,7 @@ from bridge.sim.build import simulated_bridge
 from bridge.sim.robot.robot import SimulatedRobot
 from controller.config import ControllerConfig
 from controller.core import Controller
-from controller.motion.base_estimate import BaseEstimate
+from controller.motion.body import BaseEstimate
 from controller.motion.follower import Tracking
 from controller.planning.cuts import CutPlanner
 from perception.config import PerceptionConfig

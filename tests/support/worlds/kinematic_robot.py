@@ -6,7 +6,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from bridge.core.fence import Fence
+from bridge.core.validator import Fence
 from controller.core import Controller
 from controller.ledger.journal import LedgerState, Records
 from rolling_panda import commands as intents

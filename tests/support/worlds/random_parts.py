@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from bridge.core.interface import Measurement
-from controller.motion.setpoints import Setpoints
+from controller.motion.body import Setpoints
 from controller.motion.teleoperation import Teleoperation
 from controller.supervision.modes import Event
 from controller.work.cutting import Blades
