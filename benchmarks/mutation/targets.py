@@ -65,7 +65,7 @@ TARGETS = {
         + _tests("system", "real_config"),
     ),
     "controller.work": Target(
-        ("controller/work/point_queue.py", "controller/work/blades.py"),
+        ("controller/work/point_queue.py", "controller/work/cutting.py"),
         _tests("controller", "point_queue point_queue_restored queue_requests rule_history blades"),
     ),
     "teleoperation": Target(
