@@ -30,7 +30,8 @@ demo: $(VENV)/.project
 # it computes; then those that keep real time, two at once; then those that anything beside them would disturb. Training
 # has its own target, since nothing else needs PyTorch.
 TRAINING_TESTS := tests/perception/test_training.py tests/perception/test_wide_training.py tests/perception/test_tune.py \
-	tests/perception/test_familiarity.py tests/benchmarks/test_familiarity_scores.py
+	tests/perception/test_familiarity.py tests/perception/test_int8.py \
+	tests/benchmarks/test_familiarity_scores.py
 WITHOUT_TRAINING := $(TRAINING_TESTS:%=--ignore %)
 test: check browser systemd drivers
 ifdef ARGS

@@ -86,7 +86,7 @@ def add_familiarity(path: Path, pictures: Sequence[NDArray[np.float32]]) -> floa
         ConfigError: The file holds no network of this project.
     """
     model = onnx.load(str(path))
-    _remove(model)
+    without_familiarity(model)
     layers = {name for node in model.graph.node for name in node.output}
     layer = next((name for name in _LAYERS if name in layers), None)
     if layer is None:
@@ -149,8 +149,8 @@ def _append(model: onnx.ModelProto, layer: str, mean: NDArray[np.float64], white
     model.graph.output.append(helper.make_tensor_value_info(STRANGENESS, onnx.TensorProto.FLOAT, [1]))
 
 
-def _remove(model: onnx.ModelProto) -> None:
-    """Take away what an earlier run has added."""
+def without_familiarity(model: onnx.ModelProto) -> None:
+    """Take the output `strangeness` and its limit away, where an earlier run has added them."""
 
     def own(name: str) -> bool:
         return name.startswith(_PREFIX) or name == STRANGENESS
@@ -162,6 +162,9 @@ def _remove(model: onnx.ModelProto) -> None:
     for field, kept in ((graph.node, kept_nodes), (graph.initializer, kept_values), (graph.output, kept_outputs)):
         del field[:]
         field.extend(kept)
+    properties = {each.key: each.value for each in model.metadata_props if each.key != FAMILIAR}
+    del model.metadata_props[:]
+    helper.set_model_props(model, properties)
 
 
 if __name__ == "__main__":

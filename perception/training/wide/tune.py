@@ -28,6 +28,7 @@ from perception.segmentation.frame import BACKGROUND, GROUND
 from perception.segmentation.network_segmenter import NetworkSegmenter, network_input
 from perception.single_image import photograph_width
 from perception.training.familiarity import add_familiarity
+from perception.training.int8 import weights_of
 from perception.training.wide.drawing import FAR, Artist, Drawing
 from perception.training.wide.export import MULTIPLE, Answer, prior, write_onnx
 from perception.training.wide.fit import keep, weighted_loss
@@ -358,7 +359,7 @@ def load_exported(network: PhotographNetwork, path: Path) -> None:
         graph = onnx.load(str(path)).graph
     except Exception as error:
         raise InputError(f"cannot read the network {path}: {error}") from error
-    values = {each.name: torch.from_numpy(onnx.numpy_helper.to_array(each).copy()) for each in graph.initializer}
+    values = {name: torch.from_numpy(value.copy()) for name, value in weights_of(graph).items()}
     nodes = [node for node in graph.node if node.op_type in ("Conv", "BatchNormalization")]
     layers = _in_order(network)
     other = InputError(
