@@ -42,7 +42,7 @@ TARGETS = {
         ("controller/supervision/*",),
         _tests(
             "controller",
-            "authority fencing modes permission supervisor health stop_latch lease core_control "
+            "authority fencing modes permission supervisor health latched_stops lease core_control "
             "core_interruptions preview queue_requests tracking_error core_work interrupted",
         )
         + _tests("system", "two_operators"),

@@ -11,9 +11,9 @@ from controller.supervision import health as safety
 from controller.supervision import modes
 from controller.supervision.authority import Authority, client_of
 from controller.supervision.fencing import FencingToken, draw_nonce
+from controller.supervision.latched_stops import LatchedStops
 from controller.supervision.modes import Event
 from controller.supervision.permission import Situation, hold_refusal
-from controller.supervision.stop_latch import StopLatch
 from controller.work.movement import Movement
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
@@ -49,7 +49,7 @@ class Supervisor:
         """
         self._draw = draw
         self._config, self._movement, self._event_log = config, movement, event_log
-        self.stops = StopLatch()
+        self.stops = LatchedStops()
         self.authority = Authority(config.supervision_s)
         self.fencing = FencingToken(draw)
         #: The stop to send to the bridge, until it shows that it has latched one.
@@ -77,7 +77,7 @@ class Supervisor:
 
     def restore(self, stops: Iterable[StopRecord]) -> None:
         """Take up the latched stops of an earlier start."""
-        self.stops = StopLatch(tuple(stops))
+        self.stops = LatchedStops(tuple(stops))
         self.state = modes.boot(self.stops.latched)
 
     def update(self, inbox: Inbox, trouble: m.Reason | None, now: float) -> None:

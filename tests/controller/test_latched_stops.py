@@ -1,6 +1,6 @@
 import msgspec
 
-from controller.supervision.stop_latch import StopLatch
+from controller.supervision.latched_stops import LatchedStops
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda import reasons
@@ -22,13 +22,13 @@ def bridge(stop_id):
 
 
 def test_a_stop_latches_once_and_says_who_and_why():
-    latch = StopLatch()
+    latch = LatchedStops()
     assert latch.update((stop("a"),), BRIDGE) == reasons.software_stop("eve", said("dog in the row"))
     assert latch.update((stop("a"),), bridge("a")) is None
 
 
 def test_a_stop_that_only_the_bridge_has_seen_latches_too():
-    latch = StopLatch()
+    latch = LatchedStops()
     assert latch.update((), bridge("a"), 7.0) == PRESSED
     assert latch.update((), bridge("a"), 8.0) is None
     (record,) = latch.message().stops
@@ -36,7 +36,7 @@ def test_a_stop_that_only_the_bridge_has_seen_latches_too():
 
 
 def test_a_clock_before_1970_spoils_no_record():
-    latch = StopLatch()
+    latch = LatchedStops()
     latch.update((stop("a"),), BRIDGE, -5.0)
     latch.update((), bridge("b"), -5.0)
     latch.update((stop("c"),), bridge("b"), 0.5)
@@ -45,9 +45,9 @@ def test_a_clock_before_1970_spoils_no_record():
 
 
 def test_what_was_latched_before_a_start_is_not_released_by_itself():
-    before = StopLatch()
+    before = LatchedStops()
     before.update((stop("a"),), BRIDGE)
-    latch = StopLatch(before.message().stops)
+    latch = LatchedStops(before.message().stops)
     assert not latch.released(BRIDGE) and latch.latched == reasons.software_stop("eve", said("dog in the row"))
     assert latch.message().released_by is None
 
@@ -60,11 +60,11 @@ def test_an_emergency_stop_is_told_from_a_software_stop_and_a_process_stands_for
         ("server", "eve", reasons.software_stop("eve", said("the button"))),
     ):
         pressed = m.StopRequest(stop_id="a", source=source, user=user, reason=said("the button"))
-        assert StopLatch().update((pressed,), BRIDGE) == told
+        assert LatchedStops().update((pressed,), BRIDGE) == told
 
 
 def test_reset_ends_only_when_the_bridge_shows_the_release():
-    latch = StopLatch()
+    latch = LatchedStops()
     latch.update((stop("a"),), bridge("a"))
     assert not latch.released(bridge("a"))
     assert latch.ask_release(RESET, bridge("a"), 1.0) is None
@@ -76,14 +76,14 @@ def test_reset_ends_only_when_the_bridge_shows_the_release():
 
 
 def test_a_reset_where_nothing_is_latched_releases_nothing():
-    latch = StopLatch()
+    latch = LatchedStops()
     assert latch.ask_release(msgspec.structs.replace(RESET, stop_id="a"), BRIDGE, 1.0) == reasons.stop_newer()
     assert latch.ask_release(RESET, BRIDGE, 1.0) is None
     assert latch.release_due() is None and not latch.released(BRIDGE)
 
 
 def test_echoes_of_a_released_stop_latch_nothing_but_the_bridges_latch_always_counts():
-    latch = StopLatch()
+    latch = LatchedStops()
     latch.update((stop("a"),), bridge("a"))
     latch.ask_release(RESET, bridge("a"), 1.0)
     latch.release_due()
@@ -98,7 +98,7 @@ def test_echoes_of_a_released_stop_latch_nothing_but_the_bridges_latch_always_co
 
 
 def test_every_stop_is_kept_with_who_pressed_it_and_when_and_survives_a_restart():
-    latch = StopLatch()
+    latch = LatchedStops()
     assert latch.changed
     latch.update((stop("a"),), BRIDGE, 100.0)
     latch.update((stop("b"), stop("a")), bridge("a"), 101.0)
@@ -109,14 +109,14 @@ def test_every_stop_is_kept_with_who_pressed_it_and_when_and_survives_a_restart(
         ("a", "eve", 100.0),
     ]
     assert not latch.changed and told.process == "controller"
-    again = StopLatch(told.stops)
+    again = LatchedStops(told.stops)
     assert again.latched == reasons.software_stop("eve", said("dog in the row"))
     assert again.message().stops == told.stops
     assert again.update((stop("b"),), BRIDGE) is None
 
 
 def test_a_reset_of_a_stop_that_is_not_the_newest_any_more_is_refused():
-    latch = StopLatch()
+    latch = LatchedStops()
     latch.update((stop("a"),), bridge("a"))
     latch.update((stop("b"),), bridge("b"))
     looked_at_a = intents.Reset(user="ada", role="supervisor", reason="looked at it", stop_id="a")
@@ -130,7 +130,7 @@ def test_a_reset_of_a_stop_that_is_not_the_newest_any_more_is_refused():
 
 
 def test_a_long_reason_of_a_reset_fits_the_wire():
-    latch = StopLatch()
+    latch = LatchedStops()
     latch.update((stop("a"),), bridge("a"))
     latch.ask_release(msgspec.structs.replace(RESET, reason="x" * 500), bridge("a"), 1.0)
     latch.release_due()
@@ -139,7 +139,7 @@ def test_a_long_reason_of_a_reset_fits_the_wire():
 
 
 def test_before_the_bridge_has_said_what_it_holds_a_reset_is_refused_and_later_it_is_not_lost():
-    latch = StopLatch()
+    latch = LatchedStops()
     latch.update((stop("a"),), None)
     assert latch.reset_refused(None, 1.0) == reasons.stop_unknown()
     assert not latch.released(None) and not latch.released(BRIDGE)
@@ -148,7 +148,7 @@ def test_before_the_bridge_has_said_what_it_holds_a_reset_is_refused_and_later_i
 
 
 def test_of_two_stops_the_one_that_the_bridge_holds_is_released():
-    latch = StopLatch()
+    latch = LatchedStops()
     latch.update((stop("a"),), bridge("a"))
     latch.update((stop("b"),), bridge("a"))
     looked_at_a = msgspec.structs.replace(RESET, stop_id="a")
@@ -158,7 +158,7 @@ def test_of_two_stops_the_one_that_the_bridge_holds_is_released():
 
 
 def test_a_stop_that_the_bridge_does_not_hold_is_reset_by_its_own_id():
-    latch = StopLatch()
+    latch = LatchedStops()
     latch.update((stop("a"), stop("b")), BRIDGE)
     looked_at_a = msgspec.structs.replace(RESET, stop_id="a")
     assert latch.ask_release(looked_at_a, BRIDGE, 1.0) == reasons.stop_newer()
@@ -167,7 +167,7 @@ def test_a_stop_that_the_bridge_does_not_hold_is_reset_by_its_own_id():
 
 
 def test_a_stop_during_the_reset_undoes_it():
-    latch = StopLatch()
+    latch = LatchedStops()
     latch.update((stop("a"),), bridge("a"))
     latch.ask_release(RESET, bridge("a"), 1.0)
     assert latch.update((stop("b"),), bridge("a")) != ""
@@ -176,7 +176,7 @@ def test_a_stop_during_the_reset_undoes_it():
 
 
 def test_asking_again_is_possible_when_the_bridge_did_not_answer():
-    latch = StopLatch()
+    latch = LatchedStops()
     latch.update((stop("a"),), bridge("a"))
     latch.ask_release(RESET, bridge("a"), 1.0)
     assert latch.reset_refused(bridge("a"), 1.5) == reasons.reset_under_way()

@@ -11,7 +11,7 @@ _RELEASE_S = 1.0
 _MOST = 50
 
 
-class StopLatch:
+class LatchedStops:
     """Latches stop requests together with the bridge's latch, and requests the bridge's release after a reset.
 
     The id to release is that of the newest stop that the bridge has latched.
