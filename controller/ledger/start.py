@@ -75,6 +75,15 @@ def restored(folder: Path) -> Restored:
         )
 
 
+def ticket_row(body: str) -> TicketRow:
+    """A row of kind `ticket`, of this version or an earlier one.
+
+    Raises:
+        msgspec.MsgspecError: It is not what a version has written.
+    """
+    return msgspec.convert(_upgraded(msgspec.json.decode(body)), TicketRow)
+
+
 def _newest(ledger: Ledger, kind: str, row: type[Row]) -> list[Row]:
     found = []
     for name, body in ledger.newest(kind):

@@ -11,7 +11,7 @@ import { reasonText } from "../js/state/reasons.js";
 
 /** @typedef {import("../js/link/messages.js").PagePoint} PagePoint */
 
-const USUAL = Object.freeze(["wrong cane", "wrong place", "too near a wire", "leave it"]);
+const USUAL = Object.freeze(["not a cane", "wrong cane", "wrong place", "too near a wire", "leave it"]);
 
 export class RpRejectForm extends HTMLElement {
   constructor() {
