@@ -105,9 +105,8 @@ def _from_decisions(arguments: argparse.Namespace) -> None:
         print(f"{count:5} {kind}")
     for cause, count in outcome.unmatched.most_common():
         print(f"{count:5} without a picture: {cause}")
-    print(
-        f"{pictures} picture{'s' * (pictures != 1)} and {POINTS} in {arguments.out}; {labelled} decisions have labelled pixels there"
-    )
+    print(f"{pictures} picture{'s' * (pictures != 1)} and {POINTS} in {arguments.out}")
+    print(f"{labelled:5} decisions have labelled pixels there")
     if not recording.complete:
         print("the recording is incomplete")
 

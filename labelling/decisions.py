@@ -14,8 +14,9 @@ from controller.ledger.store import FILE, check_version, read
 from rolling_panda import messages as m
 from rolling_panda.errors import InputError
 
-#: `cut`: the robot has seen the cane severed; `stood`, `was cut`: a person has looked after an unknown cut.
-DecisionKind = Literal["accepted", "rejected", "moved", "placed by hand", "cut", "stood", "was cut"]
+#: `cut`: the robot has seen the cane severed; `stood`, `was cut`: a person has looked after an unknown cut; `wrong`: a
+#: person has said afterwards that it should not have been cut there.
+DecisionKind = Literal["accepted", "rejected", "moved", "placed by hand", "cut", "stood", "was cut", "wrong"]
 _BOUND = ("ACCEPTED", "UNREACHABLE", "CUTTING")
 
 
@@ -28,12 +29,14 @@ class Decision:
         at: Unix time (s).
         point: As it was decided on; its position is in odom (m).
         reason: Of the state; None without one.
+        proposer: Segmenter that proposed the point, with the hash of its network; empty if the ledger does not tell.
     """
 
     kind: DecisionKind
     at: float
     point: m.PruningPoint
     reason: m.Reason | None
+    proposer: str = ""
 
 
 def read_decisions(state: Path) -> tuple[list[Decision], int]:
@@ -72,7 +75,11 @@ def read_decisions(state: Path) -> tuple[list[Decision], int]:
                 del decisions[last]
                 taken_back += 1
             continue
-        decisions += [Decision(kind, time, row.accepted or row.point, row.reason) for kind in _kinds(row, old)]
+        if old is not None and old.wrong_by and not row.wrong_by:
+            decisions = [each for each in decisions if not (each.kind == "wrong" and each.point.point_id == name)]
+            taken_back += 1
+        point = row.accepted or row.point
+        decisions += [Decision(kind, time, point, row.reason, row.proposer) for kind in _kinds(row, old)]
     return decisions, taken_back
 
 
@@ -94,4 +101,6 @@ def _kinds(row: TicketRow, old: TicketRow | None) -> list[DecisionKind]:
         kinds.append("was cut" if row.state == "DONE" else "stood")
     elif row.state == "DONE" and state != "DONE":
         kinds.append("cut")
+    if row.wrong_by and not (old is not None and old.wrong_by):
+        kinds.append("wrong")
     return kinds

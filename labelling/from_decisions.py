@@ -62,7 +62,8 @@ class PointLine(msgspec.Struct, frozen=True):
         cut: Kind of the cut.
         confidence: That perception told (0…1).
         rule: In force at the decision; None if the recording does not tell.
-        model: Segmenter that proposed the point, with the beginning of its hash; empty if the recording does not tell.
+        model: Segmenter that proposed the point, with the beginning of its hash; empty if neither ledger nor recording
+            tells.
         at: Time of the decision (ISO 8601, UTC).
         picture_later_s: Time from the decision to the picture (s); negative if the picture is older.
         labelled: Pixels that the decision has labelled.
@@ -201,7 +202,7 @@ def _line(decision: Decision, frames: "_Frames", index: int, pixel: tuple[float,
         cut=decision.point.kind,
         confidence=decision.point.confidence,
         rule=None if perceived is None or perceived.rule is None else msgspec.to_builtins(perceived.rule),
-        model="" if perceived is None else perceived.segmenter,
+        model=decision.proposer or ("" if perceived is None else perceived.segmenter),
         at=datetime.fromtimestamp(decision.at, UTC).isoformat(timespec="milliseconds"),
         picture_later_s=round(frames.at(index) - decision.at, 3),
         labelled=told,

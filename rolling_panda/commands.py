@@ -133,6 +133,7 @@ POINT_STATES: Final[dict[str, tuple[PointState, ...]]] = {
     "MovePoint": ("PROPOSED", "REJECTED", "FAILED_NOT_CUT"),
     "SetApproach": ("PROPOSED", "ACCEPTED", "UNREACHABLE", "FAILED_NOT_CUT", "REJECTED"),
     "ResolvePoint": ("UNKNOWN",),
+    "JudgeCut": ("DONE",),
 }
 #: Default confidence from which `AcceptAll` accepts points.
 SURE: Final = 0.8
@@ -218,6 +219,18 @@ class ResolvePoint(Intent, frozen=True, kw_only=True):
     point_id: Name
     outcome: Literal["DONE", "FAILED_NOT_CUT"]
     reason: Annotated[str, Meta(min_length=1, max_length=400)]
+
+
+class JudgeCut(Intent, frozen=True, kw_only=True):
+    """Say that a finished cut was wrong, or that it was right after all. It moves nothing; networks learn from it.
+
+    Attributes:
+        point_id: The point.
+        wrong: Whether it should not have been cut there.
+    """
+
+    point_id: Name
+    wrong: bool
 
 
 class AcceptAll(Intent, frozen=True, kw_only=True):
@@ -447,6 +460,11 @@ def _resolved(asked: ResolvePoint) -> Reason:
     return inspected(asked.user, asked.point_id, asked.reason)
 
 
+def _judged(asked: JudgeCut) -> Reason:
+    judged = reasons.cut_judged_wrong if asked.wrong else reasons.cut_judged_right
+    return judged(asked.user, asked.point_id)
+
+
 def _moved(asked: MoveInQueue) -> Reason:
     if asked.before:
         return reasons.point_moved_before(asked.user, asked.point_id, asked.before)
@@ -517,6 +535,7 @@ COMMANDS: Final[tuple[Command, ...]] = (
         lambda asked: reasons.decision_undone(asked.user, asked.point_id),
     ),
     Command(ResolvePoint, "points", "/points/{point_id}/resolve", _resolved),
+    Command(JudgeCut, "points", "/points/{point_id}/judge", _judged),
     Command(
         RestoreAccepted,
         "points",

@@ -513,6 +513,16 @@ def point_rejected_because(user: str, point: str, text: str) -> None:
 
 
 @_reason("info", "")
+def cut_judged_wrong(user: str, point: str) -> None:
+    """{user}: the cut at {point} was wrong."""
+
+
+@_reason("info", "")
+def cut_judged_right(user: str, point: str) -> None:
+    """{user}: the cut at {point} was right."""
+
+
+@_reason("info", "")
 def decision_undone(user: str, point: str) -> None:
     """{user} undid the decision about {point}."""
 

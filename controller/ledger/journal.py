@@ -42,7 +42,11 @@ class LedgerState:
 
 
 class TicketRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """State of a point. `hash` binds the acceptance; WITHDRAWN means that perception has withdrawn the point."""
+    """State of a point. `hash` binds the acceptance; WITHDRAWN means that perception has withdrawn the point.
+
+    `proposer` is the segmenter that proposed it, with the hash of its network; empty for a point by hand. `wrong_by` is
+    who has said that the cut was wrong.
+    """
 
     point: m.PruningPoint
     state: m.PointState | Literal["WITHDRAWN"]
@@ -51,6 +55,8 @@ class TicketRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     accepted: m.PruningPoint | None = None
     hash: str = ""
     cut_id: str = ""
+    proposer: str = ""
+    wrong_by: str = ""
 
 
 class OrderRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -102,7 +102,9 @@ class SessionReportBuilder:
             cut = CutReport(cut_id=row.cut_id, point_id=point.point_id, vine=point.vine, spur=point.spur, user=row.user)
             self._cuts[row.cut_id] = cut
         elif known is not None and row.state in _ENDED:
-            told = replace(known, outcome=row.state, reason=row.reason, user=row.user or known.user)
+            told = replace(
+                known, outcome=row.state, reason=row.reason, user=row.user or known.user, wrong_by=row.wrong_by
+            )
             if not known.outcome:
                 # A person may report the outcome later; the robot spends no time on that.
                 told = replace(told, ended_at=when, seconds=max(when - self._ready_since, 0.0))

@@ -42,6 +42,8 @@ class Ticket:
         hash: Hash of the accepted point.
         cut_id: Id of the last cut at the point.
         seen: Whether perception currently reports the point.
+        proposer: Segmenter that proposed it, with the hash of its network; empty for a point by hand.
+        wrong_by: Who has said that its cut was wrong; empty without anyone.
     """
 
     point: PruningPoint
@@ -52,6 +54,8 @@ class Ticket:
     hash: str = ""
     cut_id: str = ""
     seen: bool = True
+    proposer: str = ""
+    wrong_by: str = ""
 
 
 class PointQueue:
@@ -91,17 +95,18 @@ class PointQueue:
         for point in points.points:
             ticket = self._tickets.get(point.point_id)
             if ticket is None:
-                self._put(point.point_id, Ticket(point))
+                self._put(point.point_id, Ticket(point, proposer=_proposer(point, points)))
                 continue
             if not ticket.seen and ticket.state not in BOUND and _apart(ticket.point, point) > _ELSEWHERE:
                 # Perception restarted and numbers from one again: this id now belongs to another cane.
                 former = f"{point.point_id}:{point_digest(ticket.point)[:8]}"
                 self._put(former, replace(ticket, point=msgspec.structs.replace(ticket.point, point_id=former)))
-                self._put(point.point_id, Ticket(point))
+                self._put(point.point_id, Ticket(point, proposer=_proposer(point, points)))
                 continue
             if not ticket.seen and ticket.state == "ACCEPTED":
                 ticket = replace(ticket, reason=None)
-            known, ticket = ticket, replace(ticket, point=point, seen=True)
+            proposer = _proposer(point, points) if ticket.state == "PROPOSED" else ticket.proposer
+            known, ticket = ticket, replace(ticket, point=point, seen=True, proposer=proposer)
             why = _by_rule(known, point, rule) if rule is not None and known.seen else None
             why = why or self._changed(ticket)
             self._put(point.point_id, self._void(ticket, why, voided) if why else ticket)
@@ -352,7 +357,16 @@ class PointQueue:
                 continue
             point_id = row.point.point_id
             self._tickets[point_id] = Ticket(
-                row.point, row.state, row.reason, row.user, row.accepted, row.hash, row.cut_id, seen=False
+                row.point,
+                row.state,
+                row.reason,
+                row.user,
+                row.accepted,
+                row.hash,
+                row.cut_id,
+                seen=False,
+                proposer=row.proposer,
+                wrong_by=row.wrong_by,
             )
             self._order.append(point_id)
             if row.state == "CUTTING":
@@ -378,6 +392,17 @@ class PointQueue:
         if ticket.state not in POINT_STATES["ResolvePoint"]:
             return reasons.outcome_known(point_id, ticket.state)
         self._put(point_id, replace(ticket, state=outcome, reason=reasons.inspected(user, reason)))
+        return None
+
+    def judge(self, point_id: str, wrong: bool, user: str) -> Reason | None:
+        """Note that a finished cut was wrong, or right after all. Returns the reason of a refusal; None if done."""
+        ticket = self._tickets.get(point_id)
+        if ticket is None:
+            return reasons.point_unknown(point_id)
+        if ticket.state not in POINT_STATES["JudgeCut"]:
+            return reasons.point_state(point_id, ticket.state)
+        if wrong != bool(ticket.wrong_by):
+            self._put(point_id, replace(ticket, wrong_by=user if wrong else ""))
         return None
 
     def entries(self) -> tuple[QueueEntry, ...]:
@@ -466,6 +491,8 @@ class PointQueue:
             accepted=ticket.accepted,
             hash=ticket.hash,
             cut_id=ticket.cut_id,
+            proposer=ticket.proposer,
+            wrong_by=ticket.wrong_by,
         )
         self._journal.add("ticket", point_id, row)
 
@@ -473,6 +500,10 @@ class PointQueue:
         self._record(point_id, self._tickets.pop(point_id), "WITHDRAWN")
         self._order.remove(point_id)
         self._entries = None
+
+
+def _proposer(point: PruningPoint, told: PruningPoints) -> str:
+    return "" if point.kind == "by hand" else told.segmenter
 
 
 def _apart(one: PruningPoint, other: PruningPoint) -> float:
@@ -497,7 +528,7 @@ def _by_rule(known: Ticket, point: PruningPoint, rule: Reason) -> Reason | None:
 
 def _recorded(ticket: Ticket) -> tuple[object, ...]:
     """The fields of a ticket whose changes are recorded."""
-    return ticket.state, ticket.user, ticket.accepted, ticket.cut_id, ticket.point.revision
+    return ticket.state, ticket.user, ticket.accepted, ticket.cut_id, ticket.point.revision, ticket.wrong_by
 
 
 def _entry(ticket: Ticket, azimuth: float | None) -> QueueEntry:
@@ -534,6 +565,7 @@ class QueueRequests:
             intents.ResolvePoint: lambda asked, _: queue.decide(
                 asked.point_id, asked.outcome, asked.user, asked.reason
             ),
+            intents.JudgeCut: lambda asked, _: queue.judge(asked.point_id, asked.wrong, asked.user),
             intents.AcceptAll: lambda asked, _: self._accept_all(asked),
             intents.MoveInQueue: lambda asked, _: queue.move(asked.point_id, asked.before, asked.revision, asked.user),
             intents.SetApproach: lambda asked, _: queue.turn(asked.point_id, asked.azimuth, asked.user),

@@ -423,6 +423,7 @@ class CutReport(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
         user: Who accepted the point, or reported the outcome.
         ended_at: Time of its end (s since 1970); 0 during the cut.
         seconds: Time from the end of the previous cut, or from a later start of work, to the end of this cut (s).
+        wrong_by: Who has said that it was wrong; empty without anyone.
     """
 
     cut_id: ClientKey = ""
@@ -434,6 +435,7 @@ class CutReport(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     user: Text = ""
     ended_at: WallTime = 0.0
     seconds: NonNegative = 0.0
+    wrong_by: Text = ""
 
 
 class VineReport(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -102,6 +102,8 @@ class World:
                 return [kind(**common, point_id=name) for name in named if name != state.active_point_id]
             case intents.ResolvePoint:
                 return [kind(**common, point_id=name, outcome="DONE", reason="-") for name in named]
+            case intents.JudgeCut:
+                return [kind(**common, point_id=name, wrong=True) for name in named]
             case intents.ReconsiderPoint:
                 decided = [name for name in seen if states[name] in ("ACCEPTED", "UNREACHABLE", "REJECTED")]
                 return [kind(**common, point_id=name) for name in decided]

@@ -19,7 +19,7 @@ from rolling_panda.topics import INTENT, PLANT
 VALUES = {
     "point_id": "p1", "revision": 1, "vine": 1, "spur": 1, "reason": "-", "outcome": "DONE", "preview_hash": "0f",
     "required": True, "rule": PruningRule(), "origin": (0.0, 0.0, 0.0), "direction": (1.0, 0.0, 0.0), "sequence": 1,
-    "u": 0.5, "v": 0.5, "along": 0.0,
+    "u": 0.5, "v": 0.5, "along": 0.0, "wrong": True,
 }  # fmt: skip
 
 
@@ -75,6 +75,8 @@ def test_the_line_of_the_log_has_what_was_asked_for():
         ),
         (intents.SetApproach(user="ada", point_id="p1"), reasons.approach_freed("ada", "p1")),
         (intents.SetApproach(user="ada", point_id="p1", azimuth=math.pi / 2), reasons.approach_set("ada", "p1", 90.0)),
+        (intents.JudgeCut(user="ada", point_id="p1", wrong=True), reasons.cut_judged_wrong("ada", "p1")),
+        (intents.JudgeCut(user="ada", point_id="p1", wrong=False), reasons.cut_judged_right("ada", "p1")),
         (intents.RequestPreview(user="ada"), reasons.preview_requested("ada")),
         (intents.RequestPreview(user="ada", point_id="p1"), reasons.point_preview_requested("ada", "p1")),
         (intents.ApprovePreview(user="ada", preview_hash="0123456789"), reasons.preview_approved("ada", "01234567")),

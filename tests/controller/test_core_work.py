@@ -213,7 +213,8 @@ def test_refusals_say_why_and_allowed_agrees_with_them():
     r.run(0.1)
     idle = reasons.impossible_in_idle("start")
     assert r.ask(intents.Start(user="ada")).reason == r.state.allowed["Start"] == idle
-    about_points = {"AcceptPoint", "RejectPoint", "ReconsiderPoint", "ResolvePoint", "MoveInQueue", "SetApproach"}
+    about_points = {"AcceptPoint", "RejectPoint", "ReconsiderPoint", "ResolvePoint", "JudgeCut"}
+    about_points |= {"MoveInQueue", "SetApproach"}
     possible = {name for name, reason in r.state.allowed.items() if reason is None}
     assert possible == {"Arm", "RequirePreview"} | about_points
     told = {command.name for command in COMMANDS if command.process == "controller" and command.tag != "control"}

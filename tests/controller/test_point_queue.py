@@ -3,6 +3,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from controller.config import WorkConfig
+from controller.ledger.journal import Journal, TicketRow
 from controller.work.point_queue import PointQueue
 from rolling_panda import messages as m
 from rolling_panda import reasons
@@ -132,6 +133,47 @@ def test_what_a_person_saw_ends_an_unknown_cut_and_nothing_else():
     assert q.decide("a", "DONE", "eve", "the cane is off") is None
     assert (state(q), q.get("a").cut_id) == ("DONE", "cut-1")
     assert q.accept("a", 3, "eve") == reasons.point_state("a", "DONE")
+
+
+def test_a_finished_cut_can_be_called_wrong_and_right_again_and_is_recorded_each_time():
+    journal = Journal()
+    q = PointQueue(WorkConfig(), journal)
+    q.update(shown(point()))
+    assert q.judge("z", True, "ada") == reasons.point_unknown("z")
+    assert q.judge("a", True, "ada") == reasons.point_state("a", "PROPOSED")
+    q.accept("a", 3, "ada")
+    q.begin_cut("a", "c1")
+    q.resolve("a", "DONE", reasons.cutter_cut())
+    journal.drain()
+    assert q.judge("a", False, "bo") is None and not journal.drain(), "it is not called wrong"
+    assert q.judge("a", True, "bo") is None and q.judge("a", True, "cy") is None
+    assert q.judge("a", False, "ada") is None and state(q) == "DONE"
+    assert [(row.body.wrong_by, row.body.cut_id, row.body.user) for row in journal.drain()] == [
+        ("bo", "c1", "ada"),
+        ("", "c1", "ada"),
+    ]
+    restored = PointQueue(WorkConfig())
+    restored.restore([msgspec.structs.replace(q_row(q), wrong_by="bo")])
+    assert restored.get("a").wrong_by == "bo"
+
+
+def q_row(q):
+    ticket = q.get("a")
+    return TicketRow(point=ticket.point, state=ticket.state, cut_id=ticket.cut_id, proposer=ticket.proposer)
+
+
+def test_the_record_names_the_network_that_proposed_what_was_accepted():
+    journal = Journal()
+    q = PointQueue(WorkConfig(), journal)
+    q.update(m.PruningPoints(header=m.Header(), segmenter="network a.onnx 1111", frames=1, points=(point(),)))
+    q.update(m.PruningPoints(header=m.Header(), segmenter="network b.onnx 2222", frames=2, points=(point(),)))
+    q.accept("a", 3, "ada")
+    hand = point("h", kind="by hand")
+    q.update(m.PruningPoints(header=m.Header(), segmenter="network c.onnx 3333", frames=3, points=(point(), hand)))
+    q.accept("h", 3, "ada")
+    told = {row.name: row.body.proposer for row in journal.drain() if row.body.state == "ACCEPTED"}
+    assert told == {"a": "network b.onnx 2222", "h": ""}
+    assert q.get("a").proposer == "network b.onnx 2222", "another network since then did not propose it"
 
 
 def test_rejected_points_are_not_proposed_and_unknown_ones_are_named():

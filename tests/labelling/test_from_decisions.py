@@ -1,5 +1,6 @@
 """Labels from a ledger and a recording: the pixels that decisions tell of, and no others."""
 
+import dataclasses
 import io
 import json
 import zlib
@@ -164,6 +165,20 @@ def test_by_hand_moved_inspected_and_cut_are_told_apart_and_what_was_taken_back_
     assert taken_back == 1
 
 
+def test_a_cut_that_was_called_wrong_is_told_with_its_network_and_not_after_it_was_called_right(tmp_path):
+    of = at("p1", 52.0)
+    before = row(1.0, of, "DONE")
+
+    def judged(after_s, by):
+        ticket = TicketRow(point=of, state="DONE", user="Ada", proposer="network a.onnx 1111", wrong_by=by)
+        return dataclasses.replace(row(after_s, of, "DONE"), body=msgspec.json.encode(ticket).decode())
+
+    decisions, _ = read_decisions(ledger(tmp_path / "a", before, judged(2.0, "Bo")))
+    assert [(each.kind, each.proposer) for each in decisions] == [("cut", ""), ("wrong", "network a.onnx 1111")]
+    decisions, taken_back = read_decisions(ledger(tmp_path / "b", before, judged(2.0, "Bo"), judged(3.0, "")))
+    assert [each.kind for each in decisions] == ["cut"] and taken_back == 1
+
+
 def test_the_picture_is_the_nearest_in_time_that_shows_the_point(tmp_path):
     """Something is in front in the next one, a close-up is none, and the last one is too late."""
     frames = [(1.0, frame(1)), (1.9, frame(2, depth=0.4)), (2.0, frame(3, point_id="p1")), (9.0, frame(4))]
@@ -200,4 +215,4 @@ def test_the_command_tells_what_it_has_matched_and_what_not(tmp_path, capsys):
     assert (
         "2 decisions, and 0 that were taken back" in said and "1 without a picture: out of the camera's sight" in said
     )
-    assert f"1 pictures and {POINTS}" in said and (tmp_path / "out" / POINTS).exists()
+    assert f"1 picture and {POINTS}" in said and (tmp_path / "out" / POINTS).exists()

@@ -9,6 +9,7 @@ export const POINT_STATES: {
   MovePoint: readonly PointState[];
   SetApproach: readonly PointState[];
   ResolvePoint: readonly PointState[];
+  JudgeCut: readonly PointState[];
 };
 
 export const TEXT_MAX_LENGTH: number;
@@ -731,6 +732,8 @@ export interface CutReport {
   ended_at: number;
   /** Time from the end of the previous cut, or from a later start of work, to the end of this cut (s). */
   seconds: number;
+  /** Who has said that it was wrong; empty without anyone. */
+  wrong_by: string;
 }
 
 /** Cuts of one vine by outcome. */

@@ -11,6 +11,7 @@ export const POINT_STATES = Object.freeze({
   MovePoint: ["PROPOSED", "REJECTED", "FAILED_NOT_CUT"],
   SetApproach: ["PROPOSED", "ACCEPTED", "UNREACHABLE", "FAILED_NOT_CUT", "REJECTED"],
   ResolvePoint: ["UNKNOWN"],
+  JudgeCut: ["DONE"],
 });
 
 export const TEXT_MAX_LENGTH = 500;
