@@ -16,8 +16,7 @@ from rolling_panda.messages.page import PageEvents, PagePoints, PageState
 from rolling_panda.messages.supervision import SessionPlan, SessionReport
 from rolling_panda.messages.types import Reason
 from rolling_panda.resources import resource
-from server.api.commands import commands_router
-from server.api.control import Control, control_router
+from server.api.commands import Control, commands_router, control_router
 from server.api.middleware import SecurityMiddleware, is_protected, is_public
 from server.api.page_files import PageFiles
 from server.api.page_socket import page_socket_router
@@ -29,8 +28,8 @@ from server.api.sign_in import page_router, sign_in_router
 from server.api.state import camera_router, state_router
 from server.auth.sessions import Session
 from server.robots.app_state import AppState
-from server.robots.commands import Result
 from server.robots.context import RobotContext
+from server.robots.link import Result
 from server.scene.viser_adapter.proxy import viser_router
 
 _ABOUT = (

@@ -1,111 +1,30 @@
-"""Request and response bodies of the REST interface: strict types, bounds, no unknown fields, no NaN.
+"""Request and response bodies of the REST interface that are no messages: strict types and bounds, no NaN."""
 
-The bodies of requests that become a message are made from the message, with its bounds.
-"""
-
-import inspect
 import json
-from collections.abc import Callable, Collection
-from types import UnionType
-from typing import Annotated, Any, Union, get_args, get_origin
+from typing import Annotated, Any
 
-import msgspec
-from fastapi import Path
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from rolling_panda import reasons
-from rolling_panda.commands import Intent, PlantRequest
-from rolling_panda.generate.description import describe
 from rolling_panda.messages.types import Reason, Role
 
-#: As `rolling_panda.messages.Name`.
-POINT_ID: Any = Path(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9_.:\-]+$")
 #: Leaves room for the user's name in a log line of 500 characters.
 STOP_REASON_LENGTH = 400
-#: Larger integers are not exact in every JSON parser.
-_MAX_INTEGER = 2**53
 _Metre = Annotated[float, Field(ge=-1e4, le=1e4)]
 _Unit = Annotated[float, Field(ge=-1.001, le=1.001)]
-
-
-def _as_integer(value: Any) -> Any:
-    # JSON has one kind of number: 2.0 is an integer too.
-    return int(value) if isinstance(value, float) and value.is_integer() else value
-
-
-_INTEGER = BeforeValidator(_as_integer)
 
 
 class _Body(BaseModel):
     model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
 
 
-class _JsonTuples(_Body):
+class JsonTuples(_Body):
     """JSON has no tuples: these fields take lists of the same length."""
 
     @field_validator("*", mode="before")
     @classmethod
     def _tuples(cls, value: Any) -> Any:
         return tuple(value) if isinstance(value, list) else value
-
-
-#: Bounds that msgspec and pydantic call the same.
-_BOUNDS = ("ge", "gt", "le", "lt", "min_length", "max_length")
-#: Of the caller, never of a body.
-_CALLER = frozenset({*Intent.__struct_fields__, *PlantRequest.__struct_fields__})
-
-
-def fields_of(message: type[msgspec.Struct], in_path: Collection[str] = ()) -> Callable[..., dict[str, Any]]:
-    """A FastAPI dependency that reads the fields of a message from the body and the path of a request.
-
-    Args:
-        message: Type of the request. Its fields about the caller are not read.
-        in_path: Fields in the path; each is the id of a point.
-    """
-    about = describe(message)
-    own = [field for field in about.fields if field.name not in _CALLER and field.name not in in_path]
-
-    def read(**given: Any) -> dict[str, Any]:
-        body: BaseModel | None = given.pop("body", None)
-        return given | ({} if body is None else dict(body))
-
-    keyword = inspect.Parameter.KEYWORD_ONLY
-    parameters = [inspect.Parameter(name, keyword, annotation=Annotated[str, POINT_ID]) for name in in_path]
-    if own:
-        fields: dict[str, Any] = {
-            field.name: (
-                _strict(field.hint),
-                Field(... if field.required else field.default, description=field.about or None),
-            )
-            for field in own
-        }
-        model = create_model(message.__name__, __base__=_JsonTuples, __doc__=about.about, **fields)
-        parameters.append(inspect.Parameter("body", keyword, annotation=model))
-    read.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    return read
-
-
-def _strict(hint: Any) -> Any:
-    """The pydantic form of a msgspec annotation."""
-    origin, arguments = get_origin(hint), get_args(hint)
-    if hint is int:
-        return _strict(Annotated[int, msgspec.Meta()])
-    if origin is Annotated:
-        inner: Any = arguments[0] if arguments[0] is int else _strict(arguments[0])
-        for meta in arguments[1:]:
-            bounds = {name: getattr(meta, name) for name in _BOUNDS if getattr(meta, name) is not None}
-            if arguments[0] is int:
-                bounds["le"] = min(bounds.get("le", _MAX_INTEGER), _MAX_INTEGER)
-            # In the regular expressions of pydantic and of JSON Schema "$" matches at the end alone.
-            pattern = None if meta.pattern is None else meta.pattern.replace(r"(?!\n)", "")
-            inner = Annotated[inner, Field(pattern=pattern, **bounds)]
-        # The bounds come first: in the schema those outside of a validator are lost.
-        return Annotated[inner, _INTEGER] if arguments[0] is int else inner
-    if origin in (Union, UnionType):
-        return Union[tuple(_strict(argument) for argument in arguments)]  # noqa: UP007
-    if origin is tuple:
-        return tuple[tuple(_strict(argument) for argument in arguments)]  # type: ignore[misc]
-    return hint
 
 
 class SignIn(_Body):
@@ -164,7 +83,7 @@ class Stop(_Body):
         return cls(reason=text[:STOP_REASON_LENGTH]) if text else cls()
 
 
-class Target(_JsonTuples):
+class Target(JsonTuples):
     """T_odom_tool: position in m and unit quaternion x, y, z, w."""
 
     position: tuple[_Metre, _Metre, _Metre]
@@ -187,7 +106,7 @@ class BaseVelocity(_Body):
 _JointVelocity = Annotated[float, Field(ge=-10.0, le=10.0)]
 
 
-class Teleop(_JsonTuples):
+class Teleop(JsonTuples):
     """Hold the robot to a target. Without any of the three the last target stays.
 
     With `target` alone the tool moves there; its quaternion has length 1. With `base` too the tool stays there while

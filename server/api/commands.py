@@ -1,4 +1,4 @@
-"""Commands over REST: everything that an operator can do, so that a script can operate the robot.
+"""Commands over REST, and who has control: everything that an operator can do, so that a script can operate the robot.
 
 A script signs in as a page does: `POST /api/sign-in` with a single-use token, keep the cookie, and send an `Origin`
 header with the server's own address on every POST. `POST /api/invite` makes the token of another session.
@@ -18,15 +18,14 @@ from rolling_panda import reasons, topics
 from rolling_panda.commands import COMMANDS, Command, PlantRequest, SeekReplay
 from rolling_panda.errors import ServiceError
 from rolling_panda.generate.description import describe
-from rolling_panda.messages.supervision import BaseVelocity
+from rolling_panda.messages.supervision import BaseVelocity, ClientKey, ControlState
 from server.api import bodies as body
-from server.api.bodies import fields_of
-from server.api.dependencies import Caller, Operator, activity, operator, supervisor
+from server.api.dependencies import Caller, Operator, activity, fields_of, operator, supervisor
 from server.api.preview import outdated_preview
-from server.api.responses import COMMAND, STOP_BODY, TOO_MANY, answer
+from server.api.responses import COMMAND, STOP_BODY, TOO_MANY, UNAVAILABLE, answer, message, query
 from server.auth.sessions import Session
-from server.robots.commands import Result, result_of
 from server.robots.context import RobotContext
+from server.robots.link import Result, result_of
 from server.robots.teleop import MOTION_RATE_HZ, TeleopCommand
 
 #: What the server itself refuses of a command, since it has newer data than the controller: the reason, or None.
@@ -115,3 +114,29 @@ def _add(router: APIRouter, robot: RobotContext, command: Command) -> None:
         responses=COMMAND,
         description=describe(command.message).about,
     )(ask)
+
+
+class Control(ControlState, frozen=True, kw_only=True, tag="ControlState"):
+    """The state of control, with the caller's key."""
+
+    client: ClientKey
+
+
+def control_router(robot: RobotContext) -> APIRouter:
+    """`/api/control`; its transfer is in the table of commands."""
+    router = APIRouter(prefix="/api/control", tags=["control"], dependencies=[Depends(activity(robot))])
+
+    @router.get("", responses=query(Control, UNAVAILABLE))
+    async def control(session: Caller) -> Response:
+        """Who holds control, who requests it, and the remaining time of the lease; `client` is the caller's key."""
+        received = robot.link.control.peek()
+        if received is None:
+            return answer(Result(503, reasons.not_reported("controller")))
+        return message(Control(**msgspec.structs.asdict(received.message), client=session.client))
+
+    @router.post("/here", responses=COMMAND)
+    async def here(session: Operator) -> Response:
+        """Report presence, which renews the lease: a page does so while the 3-D view keeps it busy."""
+        return answer(Result(200))
+
+    return router

@@ -11,11 +11,10 @@ from rolling_panda.messages.page import PagePoints
 from rolling_panda.messages.perception import PruningRule
 from rolling_panda.messages.types import RuleEffect
 from server.api import bodies as body
-from server.api.bodies import fields_of
-from server.api.dependencies import Caller, Operator, PointId
+from server.api.dependencies import Caller, Operator, PointId, fields_of
 from server.api.responses import COMMAND, INVALID, NOT_FOUND, answer, outcome, query
-from server.robots.commands import Result
 from server.robots.context import RobotContext
+from server.robots.link import Result
 
 
 def _rule(fields: Annotated[dict[str, Any], Depends(fields_of(PruningRule))]) -> PruningRule:

@@ -9,7 +9,7 @@ from fastapi.responses import JSONResponse
 from rolling_panda.messages.types import Reason
 from rolling_panda.reasons import text_of
 from server.api import bodies as body
-from server.robots.commands import Result
+from server.robots.link import Result
 
 Responses = dict[int | str, dict[str, Any]]
 

@@ -13,8 +13,8 @@ from server.api.dependencies import Caller
 from server.api.responses import COMMAND, SIGNED_IN, STOP_BODY, RefusedError, answer
 from server.auth.sessions import Session
 from server.robots.app_state import AppState
-from server.robots.commands import Result
 from server.robots.context import RobotContext
+from server.robots.link import Result
 from server.robots.summary import RobotSummary, summarize
 
 #: Each robot's page and REST interface are below it.

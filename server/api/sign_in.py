@@ -16,7 +16,7 @@ from server.api.page_files import PageFiles
 from server.api.responses import COMMAND, SIGN_IN, SIGN_OUT, SIGNED_IN, answer, outcome
 from server.auth.sessions import Session, SignInError
 from server.robots.app_state import AppState
-from server.robots.commands import Result
+from server.robots.link import Result
 
 
 def _address(request: Request) -> str:

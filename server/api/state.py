@@ -16,8 +16,8 @@ from rolling_panda.messages.supervision import CutReport, SessionPlan, SessionRe
 from rolling_panda.reasons import text_of
 from server.api.dependencies import Caller, activity
 from server.api.responses import INVALID, NOT_FOUND, SIGNED_IN, UNAVAILABLE, answer, message, query
-from server.robots.commands import Result
 from server.robots.context import RobotContext
+from server.robots.link import Result
 from server.robots.page_view import addressed
 
 _CUT_COLUMNS = tuple(field.name for field in msgspec.structs.fields(CutReport))

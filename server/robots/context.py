@@ -4,9 +4,8 @@ from collections.abc import Callable
 
 from server.auth.sessions import Session
 from server.config import ServerConfig
-from server.robots.commands import RobotCommands
 from server.robots.event_log import RobotLog
-from server.robots.link import RobotLink
+from server.robots.link import RobotCommands, RobotLink
 from server.robots.page_view import PageView
 from server.robots.pages import RobotPages
 from server.robots.scene_updater import SceneUpdater
