@@ -73,7 +73,7 @@ TARGETS = {
             "controller/motion/teleoperation.py",
             "server/robots/teleop.py",
             "server/robots/event_log.py",
-            "server/scene/viser_adapter/proxy.py",
+            "server/scene/viser_adapter/client_messages.py",
         ),
         _tests("controller", "teleoperation") + _tests("server", "teleop event_log client_messages"),
     ),

@@ -31,7 +31,7 @@ FORWARDED = {
         "certificates of one's own for mutual TLS on the robot's wire",
     ),
     "perceive": ("perception.perceive", "classes and pruning points of one photograph"),
-    "dataset": ("labelling", "labelled pictures of a vineyard: import, label, export, check"),
+    "dataset": ("labelling", "labelled pictures of a vineyard: label, import, from-decisions, export, check"),
     "models": ("perception.models", "networks of perception: list, compare, use"),
     "train": ("perception.training.wide.tune", "fine-tune a network on pictures of your vineyard; needs PyTorch"),
     "vineyard": ("bridge.sim.vineyard.command", "grow a simulated row, write and picture it"),

@@ -18,7 +18,7 @@ from server.robots.event_log import RobotLog
 from server.robots.link import RobotLink
 from server.robots.page_view import PageView
 from server.scene.scene import Scene
-from server.scene.viser_adapter.proxy import GizmoDragEnd, GizmoUpdate
+from server.scene.viser_adapter.client_messages import GizmoDragEnd, GizmoUpdate
 
 #: Rate limit and burst of a session's motion commands; a busy browser sends several at once.
 MOTION_RATE_HZ, _MOTION_BURST = 60.0, 20.0

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from viser import _messages
 from viser.infra._messages import wire_field_names
 
-from server.scene.viser_adapter.proxy import Admitted, admit, message_type
+from server.scene.viser_adapter.client_messages import Admitted, admit, message_type
 
 CAMERA = {
     "type": "ViewerCameraMessage", "wxyz": [1, 0, 0, 0], "position": [0, 0, 1.5], "fov": 1.0, "near": 0.01,

@@ -18,7 +18,7 @@ from server.robots.page_view import PageView
 from server.robots.teleop import TeleopCommand, Teleoperation
 from server.scene.scene import Scene
 from server.scene.solids import build_solids
-from server.scene.viser_adapter.proxy import GizmoDragEnd, GizmoUpdate
+from server.scene.viser_adapter.client_messages import GizmoDragEnd, GizmoUpdate
 from tests.server.test_misuse import control
 from tests.support.fake_wire import FakeWire, joints, odometry
 

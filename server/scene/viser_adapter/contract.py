@@ -15,7 +15,7 @@ from typing import Any
 import viser
 
 from rolling_panda.errors import RollingPandaError
-from server.scene.viser_adapter.proxy import CLIENT_MESSAGES
+from server.scene.viser_adapter.client_messages import CLIENT_MESSAGES
 
 #: The version that `pyproject.toml` names, with which the assumptions were tested.
 TESTED_VERSION = "1.1.1"
