@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rolling_panda.errors import RollingPandaError
-from rolling_panda.generate import safety
+from rolling_panda.generate import languages, safety
 from rolling_panda.generate.javascript import messages_module, messages_types, reasons_catalogue
 from rolling_panda.generate.markdown import fill, reasons_table
 from rolling_panda.transport.access import access_control
@@ -28,6 +28,7 @@ def generated(root: Path = ROOT) -> dict[Path, str]:
     return {
         root / "web" / "js" / "link" / "messages.js": messages_module(),
         root / "web" / "js" / "link" / "messages.d.ts": messages_types(),
+        root / "web" / "js" / "state" / "languages.js": languages.languages_module(root / "web" / "text"),
         root / "web" / "text" / "reasons.en.json": reasons_catalogue(),
         root / "assets" / "config" / "router.json5": router_config(),
         wire: fill(wire.read_text(encoding="utf-8")),
@@ -63,7 +64,7 @@ def stale(root: Path = ROOT) -> list[Path]:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Write the files, or report those that are out of date; returns the exit code."""
+    """Write the files, or report those that are out of date and what differs between languages; returns the exit code."""
     parser = argparse.ArgumentParser(prog="python -m rolling_panda.generate", description=__doc__)
     choice = parser.add_mutually_exclusive_group(required=True)
     choice.add_argument("--check", action="store_true", help="exit with 1 when a file is out of date")
@@ -84,7 +85,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(
             f"{path.relative_to(ROOT)} is out of date; run: python -m rolling_panda.generate --write", file=sys.stderr
         )
-    return 1 if old else 0
+    wrong = languages.problems(ROOT / "web" / "text")
+    for problem in wrong:
+        print(f"web/text/{problem}", file=sys.stderr)
+    return 1 if old or wrong else 0
 
 
 if __name__ == "__main__":

@@ -1,35 +1,53 @@
-"""The page's words: each text that a script shows is in the catalogue, with exactly its values, and no other is."""
+"""The page's words: each one is in the catalogue, with exactly its values, and stands nowhere else."""
 
 import json
 import re
 from collections.abc import Iterator, Sequence
+from html.parser import HTMLParser
+from pathlib import Path
 from typing import get_args
 
 import pytest
 from playwright.sync_api import Page, expect
 
+from controller.supervision.permission import HOLD
+from controller.whole_body.collision_geometry import GROUND, part_of, robot_geometry
 from perception.dataset.dataset import VALUES
 from rolling_panda import messages as m
+from rolling_panda.commands import COMMANDS
+from rolling_panda.generate.description import union_members
+from rolling_panda.messages import page as page_messages
 from rolling_panda.messages import types
+from rolling_panda.mode_table import Event
+from rolling_panda.model.robot import RobotModel
 from rolling_panda.resources import resource
 from tests.support.played_page import until
 from tests.support.played_server import PlayedServer
 
 WEB = resource("web/index.html").parent
 TEXTS: dict[str, str] = json.loads((WEB / "text" / "page.en.json").read_text(encoding="utf-8"))
+#: Commands with a button of their own.
+BUTTONS = ("Arm", "Survey", "Start", "Pause", "Resume", "Home", "Acknowledge")
+FACTS = ("cut", "keeps", "cane", "place", "clear", "content")
 READINGS = re.findall(r'\bid: "([\w-]+)"', (WEB / "js" / "views" / "readings.js").read_text(encoding="utf-8"))
+COLUMNS = (
+    *("vine", "done", "not_cut", "unknown", "unreachable", "minutes", "ended", "point", "outcome", "seconds", "user"),
+    *("when", "who", "asked", "why", "what", "mean", "vine_count", "refused"),
+)
+CHOICES = ("part.tool", "part.base", "part.joints", "axes.tool", "axes.base", "axes.world")
+PARTS = {GROUND, *(part_of(shape.name) for shape in robot_geometry(RobotModel()).geometryObjects)}
 #: What stands for `${…}` in a key.
 FAMILIES: dict[str, Sequence[str]] = {
     "mode.${}": (*get_args(m.Mode), "none"),
     "point.${}": get_args(m.PointState),
     "phase.${}": tuple(filter(None, get_args(m.Phase))),
-    "process.${}": m.PROCESSES,
+    "process.${}": (*m.PROCESSES, "all", "page"),
     "role.${}": get_args(types.Role),
     "stop.${}": ("idle", "sending", "sent", "failed"),
     "camera.${}": get_args(types.BridgeKind),
     "camera.${}.hint": get_args(types.BridgeKind),
-    "command.${}": ("Arm", "Survey", "Start", "Pause", "Resume", "Home", "Acknowledge"),
-    "command.${}.hint": ("Arm", "Survey", "Start", "Pause", "Resume", "Home", "Acknowledge"),
+    "command.${}": (*(command.name for command in COMMANDS), HOLD),
+    "command.${}.hint": BUTTONS,
     "teleop.how.${}": ("tool", "base", "joints"),
     "telemetry.${}": ("low", "high", ""),
     "reading.${}": READINGS,
@@ -38,6 +56,34 @@ FAMILIES: dict[str, Sequence[str]] = {
     "label.${}.hint": ("train", "held-out"),
     "label.class.${}": tuple(name for name in VALUES if name != "unlabelled"),
     "report.${}": ("TakeControl", "GrantControl", "ReturnControl"),
+    "report.table.${}": ("vines", "cuts", "refusals", "control"),
+    "report.none.${}": ("vines", "cuts", "refusals", "control"),
+    "report.column.${}": COLUMNS,
+    "severity.${}": get_args(types.Severity),
+    "log.least.${}": get_args(types.Severity),
+    "invite.role.${}": get_args(types.Role),
+    "decision.${}": ("accepting", "rejecting", "reconsidering", "resolving", "moving", "moving_back"),
+    "details.${}": FACTS,
+    "details.${}.hint": FACTS,
+    "details.kind.${}": get_args(types.CutKind),
+    "details.near.${}": ("wire", "cordon", "node"),
+    "layer.${}": get_args(page_messages.Layer),
+    "preset.${}": get_args(page_messages.CameraPreset),
+    "preset.${}.hint": get_args(page_messages.CameraPreset),
+    "reject.usual.${}": ("cane", "place", "wire", "leave"),
+    "rule.${}": ("nodes_kept", "fruiting_nodes", "preferred_diameter", "offset"),
+    "rule.system.${}": ("spur", "guyot"),
+    "teleop.${}": ("part", "axes"),
+    "teleop.${}.${}": CHOICES,
+    "teleop.${}.${}.hint": CHOICES,
+    "${}.title": ("charts", "report"),
+    # What a message names.
+    "name.${}": {
+        *(event.value for event in Event),
+        *get_args(types.WoodClass),
+        *(part.rstrip("0123456789") for part in PARTS),
+        "joint",
+    },
 }
 
 
@@ -75,7 +121,7 @@ def shown() -> dict[str, set[str]]:
             for each in re.findall(r'(?:^|[?:])\s*"([^"]*)"', re.sub(r"`[^`]*`", "", key)):
                 found[each] = names("".join(values))
             for template in templates:
-                found |= {each: set() for each in family(template)}
+                found |= {each: names("".join(values)) for each in family(template)}
         for key, _, *values in arguments(script, "counted"):
             for form in ("one", "other"):
                 found[f"{json.loads(key)}.{form}"] = names("".join(values)) | {"count"}
@@ -84,13 +130,108 @@ def shown() -> dict[str, set[str]]:
 
 def family(template: str) -> list[str]:
     kind = re.sub(r"\$\{[^}]*\}", "${}", template)
-    return [kind.replace("${}", each) for each in FAMILIES[kind]]
+    return [kind.replace("${}.${}", "${}").replace("${}", each) for each in FAMILIES[kind]]
 
 
 def test_each_text_is_shown_with_exactly_its_values() -> None:
-    made = shown() | {key: set[str]() for key in family("point.${}")}
+    markup = "".join(path.read_text(encoding="utf-8") for path in WEB.glob("*.html"))
+    marked = re.findall(r'data-(?:text|label)="([^"]*)"', markup)
+    labels = [key for kind in ("point", "command", "name", "role") for key in family(f"{kind}.${{}}")]
+    made = shown() | {key: set[str]() for key in (*marked, *labels)}
     assert "stale.gone" in made and "mode.IDLE" in made
     assert {key: set(re.findall(r"\{(\w+)\}", words)) for key, words in TEXTS.items()} == made
+
+
+#: Comments and literals of a script. A template holds no template.
+TOKEN = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"|`(?:\\.|[^`\\])*`', re.DOTALL)
+#: Two words, or a value beside one, or one with a capital letter.
+PROSE = re.compile(r"[A-Za-z]{2}[,.:;…]? +[A-Za-z0]|\0[ ,:;]*[A-Za-z]{3}|[A-Za-z]{3}[ ,:;]+\0|^[A-Z][a-z]+$")
+#: Where one word is enough.
+SHOWN = re.compile(
+    r'(?:text: |ariaLabel = |title: |placeholder: |alt: |label": |\.title = |textContent = |-label", |setText\([^;]*)$'
+)
+#: What is compared, styled or looked up instead of being shown.
+UNSEEN = re.compile(
+    r"(?:class: |[!=]== |case |whyNot\(|querySelector(?:All)?\(|closest\??\.?\(|translate = |headers\.get\(|data: \{ |undecidedList\(|"
+    r'-controls": |name: |const PARTS = |const DISABLED = |getAttribute\()$'
+)
+PROPER = {"Rolling Panda", "\0 · Rolling Panda", "\0 min \0 s", "\0 min", "\0 s", "\0 mm", "\0 / \0 s"}
+KEYS = {"H", "Escape", "Tab", "Enter", "Space", "Arrow"}
+MESSAGES = {
+    struct.__name__ for struct in (*union_members(page_messages.FromServer), *union_members(page_messages.FromPage))
+}
+
+
+def loose_texts(script: str) -> list[str]:
+    """The texts that stand in a script itself."""
+    found = []
+    for token in TOKEN.finditer(script):
+        if token[0][0] == "/":
+            continue
+        words = re.sub(r"\$\{(?:[^{}]|\{[^{}]*\})*\}", "\0", token[0][1:-1])
+        before = script[: token.start()].rsplit("\n", 1)[-1]
+        key = re.fullmatch(r"[a-z_\0-]+(?:\.[\w\0-]+)+", words)
+        shown = SHOWN.search(before) and re.search("[A-Za-z]", words) and not key
+        if (
+            (shown or PROSE.search(words))
+            and not UNSEEN.search(before)
+            and words not in PROPER | KEYS | MESSAGES | {*BUTTONS}
+        ):
+            found.append(words)
+    return found
+
+
+@pytest.mark.parametrize("script", sorted(WEB.rglob("*.js")), ids=lambda path: path.name)
+def test_no_text_stands_in_a_script(script: Path) -> None:
+    if script.name not in ("messages.js", "offscreen-framebuffer.js"):
+        assert loose_texts(script.read_text(encoding="utf-8")) == []
+
+
+@pytest.mark.parametrize(
+    "script",
+    [
+        'element("p", { text: "copied" });',
+        'setText(words, "copied");',
+        'setText(words, why ? "" : "copied");',
+        'element("button", {}, "Copy");',
+        'showToast("info", "nothing has changed");',
+        'attributes: { "aria-label": "vines" }',
+        "say(`moved ${point} by ${distance} mm`);",
+        "const words = `${count} vines`;",
+    ],
+)
+def test_a_text_that_stands_in_a_script_is_found(script: str) -> None:
+    assert len(loose_texts(script)) == 1
+
+
+class Markup(HTMLParser):
+    """The words of a page's own markup, apart from those for browsers without scripts."""
+
+    def __init__(self, markup: str) -> None:
+        super().__init__()
+        self.words: list[str] = []
+        self._inside: list[str] = []
+        self.feed(markup)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self._inside.append(tag)
+        self.words.extend(value or "" for name, value in attrs if name in ("aria-label", "title", "alt", "placeholder"))
+
+    def handle_endtag(self, tag: str) -> None:
+        while self._inside and self._inside.pop() != tag:
+            pass
+
+    def handle_data(self, data: str) -> None:
+        if data.strip() and "noscript" not in self._inside:
+            self.words.append(data.strip())
+
+
+def test_no_text_stands_in_the_markup() -> None:
+    assert Markup("<p>Why<br><noscript>no</noscript> <i title=Who></i>").words == ["Why", "Who"]
+    for path in WEB.glob("*.html"):
+        markup = path.read_text(encoding="utf-8")
+        assert {*Markup(markup).words} == {"Rolling Panda"}, path
+        assert {*re.findall(r'data-(?:text|label)="([^"]*)"', markup)} <= TEXTS.keys()
 
 
 @pytest.mark.browser

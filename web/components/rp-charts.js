@@ -3,7 +3,7 @@
 import { PROCESSES } from "../js/link/messages.js";
 import { ageWords } from "../js/state/format.js";
 import { drawOn, signal } from "../js/state/signals.js";
-import { text } from "../js/state/texts.js";
+import { labelOf, text } from "../js/state/texts.js";
 import { element, setText } from "../js/views/dom.js";
 import { SPAN_MS, history, sampled } from "../js/views/history.js";
 import { READINGS, beyondLimit } from "../js/views/readings.js";
@@ -192,15 +192,15 @@ export class RpCharts extends HTMLElement {
     /** @type {Node[]} */
     this.tools = [this.when, this.pause];
     this.figures = READINGS.map((reading) => figure(reading.id, text(`reading.${reading.id}`), text(`reading.${reading.id}.hint`)));
-    this.presence = figure("presence", text("presence.label"), PROCESSES.join(", "));
+    this.presence = figure("presence", text("presence.label"), PROCESSES.map(labelOf).join(", "));
   }
 
   connectedCallback() {
     if (this.childElementCount > 0) return;
     this.tabIndex = 0;
     this.setAttribute("role", "group");
-    this.setAttribute("aria-label", "Charts; left and right arrow point at a moment");
-    const names = element("ol", { class: "bands" }, ...PROCESSES.map((name) => element("li", { text: name })));
+    this.setAttribute("aria-label", text("charts.label"));
+    const names = element("ol", { class: "bands" }, ...PROCESSES.map((name) => element("li", { text: labelOf(name) })));
     this.presence.canvas.before(names);
     this.presence.box.classList.add("presence-chart");
     this.append(...this.figures.map((each) => each.box), this.presence.box);

@@ -34,8 +34,6 @@ const SHEETS = Object.freeze({
   charts: async () => new (await import("./rp-charts.js")).RpCharts(),
   report: async () => new (await import("./rp-report.js")).RpReport(),
 });
-/** @type {Readonly<Record<string, string>>} */
-const TITLES = Object.freeze({ charts: "The last five minutes", report: "Report" });
 
 class RpDrawer extends HTMLElement {
   constructor() {
@@ -73,7 +71,7 @@ class RpDrawer extends HTMLElement {
     if (wasHidden && name) this.opener = document.activeElement;
     this.hidden = name === "";
     this.lay("");
-    setText(this.heading, TITLES[name] ?? "");
+    setText(this.heading, name && text(`${name}.title`));
     if (wasHidden && name) this.focus();
     if (!wasHidden && !name && this.opener instanceof HTMLElement) this.opener.focus();
     const load = SHEETS[name];

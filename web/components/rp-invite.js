@@ -2,15 +2,13 @@
 
 import { post } from "../js/link/api.js";
 import { link as serverLink, pageState } from "../js/state/page-state.js";
+import { reasonText } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
+import { labelOf, text } from "../js/state/texts.js";
 import { dropDown, element, setText } from "../js/views/dom.js";
 
-/** @type {readonly (readonly [role: import("../js/link/messages.js").Role, words: string])[]} */
-const ROLES = Object.freeze([
-  ["viewer", "viewer: looks, and may stop the robot"],
-  ["operator", "operator: moves the robot"],
-  ["supervisor", "supervisor: also resets a stop, and invites"],
-]);
+/** @type {readonly import("../js/link/messages.js").Role[]} */
+const ROLES = Object.freeze(["viewer", "operator", "supervisor"]);
 
 class RpInvite extends HTMLElement {
   connectedCallback() {
@@ -18,7 +16,7 @@ class RpInvite extends HTMLElement {
     const toggle = element("button", {
       id: "invite",
       class: "quiet",
-      text: "Invite",
+      text: text("invite.open"),
       attributes: { "aria-expanded": "false", "aria-controls": "invitation" },
     });
     const user = element("input", {
@@ -32,22 +30,22 @@ class RpInvite extends HTMLElement {
         autocomplete: "off",
       },
     });
-    const role = dropDown({ id: "invite-role" }, ROLES);
+    const role = dropDown({ id: "invite-role" }, ROLES.map((each) => [each, text(`invite.role.${each}`)]));
     const words = element("p", { class: "hint", attributes: { role: "status" } });
     const link = element("input", {
       id: "invite-link",
-      attributes: { type: "text", readonly: "", "aria-label": "Sign-in link" },
+      attributes: { type: "text", readonly: "", "aria-label": text("invite.link") },
     });
-    const copy = element("button", { id: "invite-copy", text: "Copy" });
+    const copy = element("button", { id: "invite-copy", text: text("invite.copy") });
     const made = element("div", { class: "invite-made" }, link, copy);
     const form = element(
       "form",
       { id: "invitation", class: "invitation" },
-      element("label", { text: "Name", attributes: { for: "invite-user" } }),
+      element("label", { text: text("sign_in.name"), attributes: { for: "invite-user" } }),
       user,
-      element("label", { text: "Role", attributes: { for: "invite-role" } }),
+      element("label", { text: text("invite.role"), attributes: { for: "invite-role" } }),
       role,
-      element("button", { id: "invite-make", class: "primary", text: "Make a link", attributes: { type: "submit" } }),
+      element("button", { id: "invite-make", class: "primary", text: text("invite.make"), attributes: { type: "submit" } }),
       words,
       made,
     );
@@ -59,7 +57,7 @@ class RpInvite extends HTMLElement {
       // A link must not stay on the screen.
       link.value = "";
       made.hidden = true;
-      setText(words, "A person or a script signs in with it once, within ten minutes.");
+      setText(words, text("invite.how"));
     };
     show(false);
     toggle.addEventListener("click", () => {
@@ -75,23 +73,23 @@ class RpInvite extends HTMLElement {
       event.preventDefault();
       const answer = await post("api/invite", { user: user.value.trim(), role: role.value });
       if (!answer.ok || !answer.link) {
-        setText(words, `No link was made: ${answer.reason}`);
+        setText(words, text("invite.refused", { why: reasonText(answer.why) }));
         return;
       }
       // The server knows its local address; this page knows the one in use.
       const path = new URL(answer.link);
       link.value = `${location.origin}${path.pathname}${path.search}`;
       made.hidden = false;
-      setText(words, `For ${user.value.trim()}, ${role.value}: signs in once, within ten minutes.`);
+      setText(words, text("invite.made", { user: user.value.trim(), role: labelOf(role.value) }));
       link.select();
     });
     copy.addEventListener("click", async () => {
       link.select();
       try {
         await navigator.clipboard.writeText(link.value);
-        setText(words, "Copied.");
+        setText(words, text("invite.copied"));
       } catch {
-        setText(words, "The browser does not let a page copy here: press Ctrl+C.");
+        setText(words, text("invite.copy_by_hand"));
       }
     });
     drawOn([pageState, serverLink], () => {

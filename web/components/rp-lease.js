@@ -12,8 +12,8 @@ import { element, setEnabled, setText } from "../js/views/dom.js";
 const CONFIRM_MS = 4000;
 
 class RpLease extends HTMLElement {
-  give = button("grant-control", () => void ask("Granting control", "api/control/grant"));
-  request = button("request-control", () => void ask("Asking for control", "api/control/request"));
+  give = button("grant-control", () => void ask(text("control.granting"), "api/control/grant"));
+  request = button("request-control", () => void ask(text("control.asking"), "api/control/request"));
   take = button("take-control", () => this.confirmTake());
   /** End of that time (ms). */
   armed = 0;
@@ -67,7 +67,7 @@ class RpLease extends HTMLElement {
       return;
     }
     this.armed = 0;
-    void ask("Taking control", "api/control/take", { confirm: held });
+    void ask(text("control.taking"), "api/control/take", { confirm: held });
   }
 
   /**

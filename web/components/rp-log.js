@@ -5,41 +5,34 @@ import { clockWords } from "../js/state/format.js";
 import { log } from "../js/state/page-state.js";
 import { reasonText } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
-import { text } from "../js/state/texts.js";
+import { labelOf, text } from "../js/state/texts.js";
 import { dropDown, element, setText } from "../js/views/dom.js";
 import { icon } from "../js/views/icons.js";
 import { drawerButton } from "./rp-drawer.js";
 
 /** @typedef {import("../js/link/messages.js").PageEvent} PageEvent */
 
-/** @typedef {readonly (readonly [value: string, words: string])[]} Options */
-
-/** @type {Options} */
-const LEAST = Object.freeze([
-  ["info", "Everything"],
-  ["warning", "Warnings and errors"],
-  ["error", "Errors"],
-]);
-/** With the page's own lines. @type {Options} */
-const FROM = [["", "All processes"], ...PROCESSES.map((name) => /** @type {const} */ ([name, name])), ["page", "page"]];
+const LEAST = Object.freeze(["info", "warning", "error"]);
+/** With the page's own lines. */
+const FROM = Object.freeze(["all", ...PROCESSES, "page"]);
 
 class RpLog extends HTMLElement {
   connectedCallback() {
     const least = dropDown(
-      { id: "log-filter", attributes: { "aria-label": "Least severity shown in the log" } },
-      LEAST,
+      { id: "log-filter", attributes: { "aria-label": text("log.least_label") } },
+      LEAST.map((each) => [each, text(`log.least.${each}`)]),
     );
-    const from = dropDown({ id: "log-process", attributes: { "aria-label": "Process shown in the log" } }, FROM);
+    const from = dropDown({ id: "log-process", attributes: { "aria-label": text("log.process_label") } }, FROM.map((each) => [each, text(`process.${each}`)]));
     const words = element("input", {
       id: "log-words",
-      attributes: { type: "search", placeholder: "Find", "aria-label": "Words shown in the log", autocomplete: "off" },
+      attributes: { type: "search", placeholder: text("log.find"), "aria-label": text("log.find_label"), autocomplete: "off" },
     });
-    const list = element("ol", { class: "lines", attributes: { "aria-label": "Event log", tabindex: "0" } });
+    const list = element("ol", { class: "lines", attributes: { "aria-label": text("log.label"), tabindex: "0" } });
     const live = element("div", { class: "live", attributes: { role: "log", "aria-live": "polite" } }, list);
     const empty = element("p", { class: "empty" });
     this.id = "log";
-    const tools = element("div", { class: "log-tools" }, words, from, least, drawerButton("report", "Report"));
-    this.append(element("div", { class: "panel-head" }, element("h2", { text: "Log" }), tools), live, empty);
+    const tools = element("div", { class: "log-tools" }, words, from, least, drawerButton("report", text("report.title")));
+    this.append(element("div", { class: "panel-head" }, element("h2", { text: text("log.title") }), tools), live, empty);
 
     // Follow the newest line until the operator scrolls up; a resize does not count.
     let following = true;
@@ -59,7 +52,7 @@ class RpLog extends HTMLElement {
     /** @param {PageEvent} line */
     const isWanted = (line) =>
       (least.value === "info" || line.severity === "error" || line.severity === least.value) &&
-      (from.value === "" || line.process === from.value) &&
+      (from.value === "all" || line.process === from.value) &&
       wordsOf(line).toLowerCase().includes(words.value.trim().toLowerCase());
 
     /** @type {Map<PageEvent, HTMLElement>} */
@@ -112,8 +105,8 @@ function lineRow(line) {
     "li",
     { data: { severity: line.severity } },
     element("time", { text: clockWords(line.wall_time) }),
-    element("span", { class: "severity", attributes: { title: line.severity } }, icon(line.severity), line.severity),
-    element("span", { class: "process", text: line.process }),
+    element("span", { class: "severity", attributes: { title: text(`severity.${line.severity}`) } }, icon(line.severity), text(`severity.${line.severity}`)),
+    element("span", { class: "process", text: labelOf(line.process) }),
     element("span", { class: "text", text: wordsOf(line) }),
   );
 }

@@ -10,7 +10,7 @@ import { setIcon } from "../js/views/icons.js";
 class RpMode extends HTMLElement {
   connectedCallback() {
     this.setAttribute("role", "status");
-    this.setAttribute("aria-label", "Mode");
+    this.setAttribute("aria-label", text("mode.label"));
     const shape = element("span", { class: "shape" });
     const word = element("span", { class: "word" });
     const chip = element("span", { id: "mode", class: "chip mode", data: { mode: "" } }, shape, word);

@@ -4,6 +4,7 @@ import { move, whyNotMove } from "../js/control/decisions.js";
 import { turnApproach, whyNotTurn } from "../js/control/order.js";
 import { newtons, uncertainty } from "../js/state/format.js";
 import { reason } from "../js/state/reasons.js";
+import { text } from "../js/state/texts.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
 
 /** @typedef {import("../js/link/messages.js").PagePoint} PagePoint */
@@ -17,28 +18,21 @@ const SETTLE_MS = 150;
 /** Steps along the cane (mm). */
 const STEPS = Object.freeze([-5, -1, 1, 5]);
 
-/** @type {readonly (readonly [word: string, hint: string, value: (point: PruningPoint) => string])[]} */
+/** Their words are `details.NAME`. @type {readonly (readonly [name: string, value: (point: PruningPoint) => string])[]} */
 const FACTS = Object.freeze([
-  ["Cut", "What is cut, and how far past the last node that stays", cutWords],
-  [
-    "Keeps",
-    "Nodes that stay, of those seen on the cane",
-    (point) => `${point.nodes_kept} of ${point.nodes_seen} nodes`,
-  ],
-  ["Cane", "Thickness, and the force that the blades are expected to need", caneWords],
-  ["Place", "How well the place is known, one standard deviation, and the direction of the cane", placeWords],
-  ["Clear of", "From the cut to the nearest known wire, cordon, and node that stays", clearWords],
-  [
-    "Content",
-    "Revision and hash of what is accepted",
-    (point) => `${point.revision} · ${point.digest.slice(0, 8) || "–"}`,
-  ],
+  ["cut", cutWords],
+  ["keeps", (point) => text("details.nodes", { kept: point.nodes_kept, seen: point.nodes_seen })],
+  ["cane", caneWords],
+  ["place", placeWords],
+  ["clear", clearWords],
+  ["content", (point) => `${point.revision} · ${point.digest.slice(0, 8) || "–"}`],
 ]);
 
 /** @param {PruningPoint} point */
 function cutWords(point) {
-  const kind = `${point.kind.charAt(0).toUpperCase()}${point.kind.slice(1)}`;
-  return point.offset === null ? kind : `${kind}, ${Math.round(1000 * point.offset)} mm past node ${point.nodes_kept}`;
+  const kind = text(`details.kind.${point.kind}`);
+  if (point.offset === null) return kind;
+  return text("details.past", { kind, offset: Math.round(1000 * point.offset), node: point.nodes_kept });
 }
 
 /** @param {PruningPoint} point */
@@ -63,38 +57,39 @@ function clearWords(point) {
     ["node", point.node_distance],
   ]);
   const known = near.filter(([, distance]) => distance !== null);
-  if (known.length === 0) return "nothing known near";
-  return `${known.map(([name, distance]) => `${name} ${Math.round(1000 * (distance ?? 0))}`).join(" · ")} mm`;
+  if (known.length === 0) return text("details.nothing_near");
+  const distances = known.map(([name, distance]) => `${text(`details.near.${name}`)} ${Math.round(1000 * (distance ?? 0))}`);
+  return `${distances.join(" · ")} mm`;
 }
 
 export class RpPointDetails extends HTMLElement {
   constructor() {
     super();
-    this.picture = element("img", { attributes: { alt: "What the camera saw of this spur, the cut in the middle" } });
+    this.picture = element("img", { attributes: { alt: text("details.crop") } });
     this.frame = element("figure", { class: "crop" }, this.picture);
     this.facts = element("dl", { class: "number" });
     this.values = FACTS.map(() => element("dd"));
-    this.moves = element("div", { class: "moves", attributes: { role: "group", "aria-label": "Move along the cane" } });
+    this.moves = element("div", { class: "moves", attributes: { role: "group", "aria-label": text("details.move_label") } });
     /** @type {PagePoint|null} */
     this.row = null;
     this.buttons = STEPS.map((step) => {
       const words = `${step > 0 ? "+" : "−"}${Math.abs(step)}`;
       return element("button", { class: "quiet", text: words, onclick: () => this.move(step) });
     });
-    this.moves.append(element("span", { text: "Move, mm" }), ...this.buttons);
+    this.moves.append(element("span", { text: text("details.move") }), ...this.buttons);
     this.turn = element("input", {
       attributes: {
         type: "range",
         min: "-75",
         max: "75",
         step: "5",
-        "aria-label": "Turn of the approach about the cane",
+        "aria-label": text("details.turn"),
       },
     });
     this.turned = element("span", { class: "number" });
     this.free = element("button", {
       class: "quiet",
-      text: "As found",
+      text: text("details.as_found"),
       onclick: () => this.row && void turnApproach(this.row, null),
     });
     this.turning = 0;
@@ -102,7 +97,7 @@ export class RpPointDetails extends HTMLElement {
     this.approach = element(
       "div",
       { class: "approach" },
-      element("span", { text: "Approach" }),
+      element("span", { text: text("details.approach") }),
       this.turn,
       this.turned,
       this.free,
@@ -114,9 +109,9 @@ export class RpPointDetails extends HTMLElement {
 
   connectedCallback() {
     if (this.childElementCount > 0) return;
-    FACTS.forEach(([word, hint], at) => {
-      const value = this.values[at] ?? "";
-      this.facts.append(element("div", { attributes: { title: hint } }, element("dt", { text: word }), value));
+    FACTS.forEach(([name], at) => {
+      const [term, title] = [element("dt", { text: text(`details.${name}`) }), text(`details.${name}.hint`)];
+      this.facts.append(element("div", { attributes: { title } }, term, this.values[at] ?? ""));
     });
     this.picture.addEventListener("load", () => this.frame.classList.add("loaded"));
     this.picture.addEventListener("error", () => {
@@ -146,16 +141,16 @@ export class RpPointDetails extends HTMLElement {
   showApproach(row) {
     const { azimuth } = row.entry;
     const why = whyNotTurn(row);
-    setEnabled(this.turn, why, "From where the blades come, turned about the cane; an accepted cut is planned anew");
+    setEnabled(this.turn, why, text("details.turn_hint"));
     setEnabled(
       this.free,
       why ?? (azimuth === null ? reason("approach_free") : null),
-      "Leave the approach to the search",
+      text("details.as_found_hint"),
     );
     if (this.turning) return;
     const degrees = azimuth === null ? 0 : Math.round((180 * azimuth) / Math.PI);
     this.turn.value = String(degrees);
-    setText(this.turned, azimuth === null ? "found" : `${degrees}°`);
+    setText(this.turned, azimuth === null ? text("details.found") : `${degrees}°`);
   }
 
   /** @param {PagePoint} row */
@@ -166,10 +161,9 @@ export class RpPointDetails extends HTMLElement {
     const why = whyNotMove(row);
     this.buttons.forEach((button, at) => {
       const step = STEPS[at] ?? 0;
-      const where = step > 0 ? "away from the cordon" : "towards the cordon";
-      setEnabled(button, why, `Move the cut ${Math.abs(step)} mm ${where}; it is judged anew`);
+      setEnabled(button, why, text(step > 0 ? "details.move_out" : "details.move_in", { distance: Math.abs(step) }));
     });
-    FACTS.forEach(([, , value], at) => {
+    FACTS.forEach(([, value], at) => {
       const node = this.values[at];
       if (node) setText(node, value(point));
     });

@@ -4,7 +4,7 @@ import { accept, isUncertain, isUnknown, reject, whyNotAccept, whyNotReject } fr
 import { cutTime } from "../js/control/order.js";
 import { select, selectAndReveal } from "../js/control/selection.js";
 import { TEXT_MAX_LENGTH } from "../js/link/messages.js";
-import { counted, labelOf } from "../js/state/texts.js";
+import { counted, labelOf, text } from "../js/state/texts.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
 import { icon, setIcon } from "../js/views/icons.js";
 import { reasonText } from "../js/state/reasons.js";
@@ -21,24 +21,24 @@ export class RpRejectForm extends HTMLElement {
     this.input = element("input", {
       id: "reject-reason",
       attributes: {
-        placeholder: "Why? (may stay empty)",
+        placeholder: text("reject.why"),
         maxlength: String(TEXT_MAX_LENGTH),
-        "aria-label": "Why it is rejected",
+        "aria-label": text("reject.why_label"),
       },
     });
   }
 
   connectedCallback() {
     if (this.childElementCount > 0) return;
-    const send = element("button", { id: "reject-send", text: "Reject", attributes: { type: "submit" } });
+    const send = element("button", { id: "reject-send", text: text("row.reject"), attributes: { type: "submit" } });
     const form = element("form", {}, this.input, send);
     form.addEventListener("submit", (event) => {
       event.preventDefault();
       this.send(this.input.value.trim());
     });
     const usual = element("div", { class: "usual" });
-    for (const words of USUAL) {
-      usual.append(element("button", { class: "quiet", text: words, onclick: () => this.send(words) }));
+    for (const each of USUAL) {
+      usual.append(element("button", { class: "quiet", text: labelOf(each), onclick: () => this.send(each) }));
     }
     this.append(form, usual);
     this.addEventListener("keydown", (event) => {
@@ -82,9 +82,16 @@ customElements.define("rp-reject-form", RpRejectForm);
 function planWords({ plan }) {
   if (!plan?.order) return "";
   const shown = plan.rollout;
-  if (!shown) return `; planned as no. ${plan.order}`;
-  const clear = `${Math.round(1000 * shown.clearance)} mm between ${shown.between.join(" and ")}`;
-  return `; planned as no. ${plan.order}: the cut takes ${cutTime(plan)} and leaves ${clear}, manipulability ${shown.manipulability.toFixed(3)}`;
+  if (!shown) return text("row.planned", { order: plan.order });
+  const [one, other] = shown.between;
+  return text("row.planned_cut", {
+    order: plan.order,
+    time: cutTime(plan),
+    clearance: Math.round(1000 * shown.clearance),
+    one: labelOf(one),
+    other: labelOf(other),
+    omega: shown.manipulability.toFixed(3),
+  });
 }
 
 export class RpPoint extends HTMLElement {
@@ -161,22 +168,20 @@ export class RpPoint extends HTMLElement {
     const thick = `${(2000 * point.radius).toFixed(1)} mm`;
     // Rounded down, so that a value shown as enough for "Accept all" is enough.
     const sure = `${Math.floor(100 * point.confidence + 1e-9)} %`;
-    const planned = row.plan?.order ? [`no. ${row.plan.order}`, cutTime(row.plan)].filter(Boolean).join(", ") : "";
+    const planned = row.plan?.order ? [text("row.number", { order: row.plan.order }), cutTime(row.plan)].filter(Boolean).join(", ") : "";
     setText(
       this.facts,
-      `${point.nodes_kept}/${point.nodes_seen} nodes · ${thick} · ${isUncertain(row) ? "only " : ""}${sure}`,
+      text(isUncertain(row) ? "row.facts_unsure" : "row.facts", { kept: point.nodes_kept, seen: point.nodes_seen, thick, sure }),
     );
     const kept = counted("point.keeps", point.nodes_seen, { kept: point.nodes_kept });
-    this.facts.title = `${kept}; the cane is ${thick} thick; confidence ${sure}${planWords(row)}`;
+    this.facts.title = [text("row.hint", { kept, thick, sure }), planWords(row)].filter(Boolean).join("; ");
     setText(this.reason, [planned, reasonText(entry.reason), reasonText(point.reason)].filter(Boolean).join(" · "));
     this.reason.title = this.reason.textContent ?? "";
-    const [yes, no] = isUnknown(row)
-      ? ["I have looked: it is cut", "I have looked: it is not cut"]
-      : ["Accept", "Reject"];
-    setEnabled(this.acceptButton, whyNotAccept(row), isUnknown(row) ? `${yes} (A)` : "Accept this cut (A)");
-    setEnabled(this.rejectButton, whyNotReject(row), isUnknown(row) ? `${no} (R)` : "Reject this cut (R)");
-    this.acceptButton.setAttribute("aria-label", `${yes} ${point.point_id}`);
-    this.rejectButton.setAttribute("aria-label", `${no} ${point.point_id}`);
+    const unknown = isUnknown(row);
+    setEnabled(this.acceptButton, whyNotAccept(row), text(unknown ? "row.was_cut_hint" : "row.accept_hint"));
+    setEnabled(this.rejectButton, whyNotReject(row), text(unknown ? "row.was_not_cut_hint" : "row.reject_hint"));
+    this.acceptButton.ariaLabel = text(unknown ? "row.was_cut" : "row.accept_named", { point: point.point_id });
+    this.rejectButton.ariaLabel = text(unknown ? "row.was_not_cut" : "row.reject_named", { point: point.point_id });
   }
 }
 customElements.define("rp-point", RpPoint);

@@ -1,9 +1,10 @@
 // Playback of a recording: position, play and pause, and who accepted which point.
 
 import { ask } from "../js/link/api.js";
+import { dateWords } from "../js/state/format.js";
 import { pageState, points } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
-import { text } from "../js/state/texts.js";
+import { labelOf, text } from "../js/state/texts.js";
 import { element, setText } from "../js/views/dom.js";
 
 class RpReplay extends HTMLElement {
@@ -53,15 +54,21 @@ class RpReplay extends HTMLElement {
     setText(this.toggle, text(replay.playing ? "replay.pause" : "replay.play"));
     this.slider.max = String(replay.duration_s);
     if (!this.dragged) this.slider.value = String(replay.position_s);
-    const at = new Date(1000 * (replay.begins_at + replay.position_s));
-    setText(this.time, `${replay.position_s.toFixed(1)} of ${replay.duration_s.toFixed(1)} s · ${at.toLocaleString()}`);
+    setText(
+      this.time,
+      text("replay.time", {
+        at: replay.position_s.toFixed(1),
+        end: replay.duration_s.toFixed(1),
+        date: dateWords(replay.begins_at + replay.position_s),
+      }),
+    );
   }
 
   drawList() {
     if (this.hidden) return;
     const rows = (points.get()?.points ?? []).filter((row) => row.entry.user !== "");
-    const lines = rows.map((row) => `${row.entry.point_id}: ${row.entry.user} · ${row.entry.state.toLowerCase()}`);
-    const words = lines.length > 0 ? lines : ["nobody has accepted any yet"];
+    const lines = rows.map((row) => `${row.entry.point_id}: ${row.entry.user} · ${labelOf(row.entry.state)}`);
+    const words = lines.length > 0 ? lines : [text("replay.nobody")];
     if (words.join("\n") === [...this.list.children].map((item) => item.textContent).join("\n")) return;
     this.list.replaceChildren(...words.map((text) => element("li", { text })));
   }

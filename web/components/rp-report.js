@@ -1,5 +1,6 @@
 // The session report: cuts by outcome and vine, durations, refusals, and who held control.
 
+import { reasonIn } from "../js/link/api.js";
 import { clockWords } from "../js/state/format.js";
 import { reasonText } from "../js/state/reasons.js";
 import { counted, labelOf, text } from "../js/state/texts.js";
@@ -16,10 +17,10 @@ export class RpReport extends HTMLElement {
     this.timer = 0;
     this.words = element("p", { class: "hint", attributes: { role: "status" } });
     this.sums = element("dl", { class: "sums number" });
-    this.vines = table("By vine", ["Vine", "Done", "Not cut", "Unknown", "Out of reach", "Minutes"]);
-    this.cuts = table("Cuts, the newest first", ["Ended", "Point", "Vine", "Outcome", "Seconds", "Accepted by"]);
-    this.refusals = table("Refused, the newest first", ["When", "Who", "Asked for", "Why"]);
-    this.control = table("Control", ["When", "Who", "What"]);
+    this.vines = table("vines", ["vine", "done", "not_cut", "unknown", "unreachable", "minutes"]);
+    this.cuts = table("cuts", ["ended", "point", "vine", "outcome", "seconds", "user"]);
+    this.refusals = table("refusals", ["when", "who", "asked", "why"]);
+    this.control = table("control", ["when", "who", "what"]);
     /** @type {Node[]} */
     this.tools = [download("api/report", "report.json", "JSON"), download("api/report.csv", "cuts.csv", "CSV")];
   }
@@ -28,7 +29,7 @@ export class RpReport extends HTMLElement {
     if (this.childElementCount > 0) return;
     this.tabIndex = 0;
     this.setAttribute("role", "group");
-    this.setAttribute("aria-label", "Report");
+    this.setAttribute("aria-label", text("report.title"));
     const tables = [this.vines, this.cuts, this.refusals, this.control];
     this.append(this.words, this.sums, ...tables.map((each) => each.box));
   }
@@ -46,7 +47,7 @@ export class RpReport extends HTMLElement {
       const response = await fetch("api/report", { credentials: "same-origin", signal: AbortSignal.timeout(4000) });
       const body = await response.json();
       if (response.ok) this.show(body);
-      else setText(this.words, text("report.old", { why: body.reason }));
+      else setText(this.words, text("report.old", { why: reasonText(reasonIn(body)) }));
     } catch {
       setText(this.words, text("report.unreachable"));
     }
@@ -64,13 +65,13 @@ export class RpReport extends HTMLElement {
     const count = (/** @type {"done"|"not_cut"|"unknown"|"unreachable"} */ name) =>
       report.vines.reduce((sum, vine) => sum + vine[name], 0);
     sums(this.sums, [
-      ["Done", count("done")],
-      ["Not cut", count("not_cut")],
-      ["Unknown", count("unknown")],
-      ["Out of reach", count("unreachable")],
-      ["Seconds a cut", ended.length > 0 ? (seconds / ended.length).toFixed(1) : "–"],
-      ["Vines", report.vines.length],
-      ["Refused", report.refusal_count],
+      ["done", count("done")],
+      ["not_cut", count("not_cut")],
+      ["unknown", count("unknown")],
+      ["unreachable", count("unreachable")],
+      ["mean", ended.length > 0 ? (seconds / ended.length).toFixed(1) : "–"],
+      ["vine_count", report.vines.length],
+      ["refused", report.refusal_count],
     ]);
     this.vines.show(
       report.vines.map((vine) => [
@@ -81,51 +82,44 @@ export class RpReport extends HTMLElement {
         vine.unreachable,
         (vine.seconds / 60).toFixed(1),
       ]),
-      "No vine has been worked on yet.",
     );
     this.cuts.show(
       [...report.cuts]
         .reverse()
         .map((cut) => [
-          cut.ended_at > 0 ? clockWords(cut.ended_at) : "now",
+          cut.ended_at > 0 ? clockWords(cut.ended_at) : text("report.now"),
           cut.point_id,
           cut.vine,
           [labelOf(cut.outcome || "CUTTING"), reasonText(cut.reason)].filter(Boolean).join(": "),
           cut.ended_at > 0 ? cut.seconds.toFixed(1) : "–",
           cut.user,
         ]),
-      "Nothing has been cut yet.",
     );
     this.refusals.show(
-      [...report.refusals].reverse().map((each) => [clockWords(each.at), each.user, each.asked, reasonText(each.reason)]),
-      "Nothing was refused.",
+      [...report.refusals].reverse().map((each) => [clockWords(each.at), each.user, labelOf(each.asked), reasonText(each.reason)]),
     );
     this.control.show(
       [...report.control].reverse().map((each) => [clockWords(each.at), each.user, text(`report.${each.asked}`)]),
-      "Control has not changed hands.",
     );
   }
 }
 
 /**
- * @param {string} title
- * @param {readonly string[]} columns
+ * @param {string} name Of its title, `report.table.NAME`.
+ * @param {readonly string[]} columns Of their heads, `report.column.COLUMN`.
  */
-function table(title, columns) {
+function table(name, columns) {
   const body = element("tbody");
-  const head = element("tr", {}, ...columns.map((text) => element("th", { text, attributes: { scope: "col" } })));
+  const head = element("tr", {}, ...columns.map((each) => element("th", { text: text(`report.column.${each}`), attributes: { scope: "col" } })));
   const empty = element("p", { class: "hint" });
   const grid = element("table", {}, element("thead", {}, head), body);
-  const box = element("section", {}, element("h3", { text: title }), grid, empty);
+  const box = element("section", {}, element("h3", { text: text(`report.table.${name}`) }), grid, empty);
   return {
     box,
-    /**
-     * @param {readonly (readonly (string|number)[])[]} rows
-     * @param {string} nothing Text without rows.
-     */
-    show(rows, nothing) {
+    /** @param {readonly (readonly (string|number)[])[]} rows */
+    show(rows) {
       grid.hidden = rows.length === 0;
-      setText(empty, rows.length === 0 ? nothing : "");
+      setText(empty, rows.length === 0 ? text(`report.none.${name}`) : "");
       body.replaceChildren(
         ...rows.map((row) => element("tr", {}, ...row.map((cell) => element("td", { text: String(cell) })))),
       );
@@ -139,8 +133,8 @@ function table(title, columns) {
  */
 function sums(list, pairs) {
   list.replaceChildren(
-    ...pairs.map(([word, value]) =>
-      element("div", {}, element("dt", { text: word }), element("dd", { text: String(value) })),
+    ...pairs.map(([name, value]) =>
+      element("div", {}, element("dt", { text: text(`report.column.${name}`) }), element("dd", { text: String(value) })),
     ),
   );
 }
@@ -154,7 +148,7 @@ function download(path, name, words) {
   return element("a", {
     class: "button",
     text: words,
-    attributes: { href: path, download: name, title: `Save ${name}` },
+    attributes: { href: path, download: name, title: text("report.save", { name }) },
   });
 }
 customElements.define("rp-report", RpReport);

@@ -10,7 +10,7 @@ import { element, setText } from "../js/views/dom.js";
 import { SPAN_MS, history } from "../js/views/history.js";
 import { setIcon } from "../js/views/icons.js";
 
-const KEY = `history of ${location.pathname}`;
+const KEY = `history.${location.pathname}`;
 
 /**
  * Times of the samples (ms since 1970) and a row of values for each name; null is unknown.
@@ -86,7 +86,7 @@ class RpRobots extends HTMLElement {
 
   connectedCallback() {
     this.setAttribute("role", "navigation");
-    this.setAttribute("aria-label", "Robots");
+    this.setAttribute("aria-label", text("robots.label"));
     this.append(this.list);
     persistHistory();
     void this.ask();

@@ -4,8 +4,9 @@ import { whyNothingOf } from "../js/control/allowed.js";
 import { pushUndo } from "../js/control/decisions.js";
 import { ask, post } from "../js/link/api.js";
 import { link, now, pageState, points } from "../js/state/page-state.js";
-import { reason } from "../js/state/reasons.js";
+import { reason, reasonText } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
+import { text } from "../js/state/texts.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
 
 /** @typedef {import("../js/link/messages.js").PruningRule} PruningRule */
@@ -21,18 +22,21 @@ function tryRule(rule) {
 
 /** @param {PruningRule} rule */
 async function applyRule(rule) {
-  const done = await ask("The rule", "api/rule", rule);
+  const done = await ask(text("rule.asked"), "api/rule", rule);
   // Refused unless it is still in force: another person's rule cannot be undone from here.
-  if (done) pushUndo(`the rule ${ruleWords(rule)}`, () => ask("Taking the rule back", "api/rule/undo", rule));
+  if (done) pushUndo(text("rule.named", { rule: ruleWords(rule) }), () => ask(text("rule.taking_back"), "api/rule/undo", rule));
   return done;
 }
 
 /** @param {PruningRule} rule */
 function ruleWords(rule) {
   const nodes = rule.system === "guyot" ? `${rule.nodes_kept} + ${rule.fruiting_nodes}` : `${rule.nodes_kept}`;
-  const word = rule.system === "guyot" ? "Guyot" : "Spur";
-  const thick = Number((1000 * rule.preferred_diameter).toFixed(1));
-  return `${word} · ${nodes} nodes · ≥ ${thick} mm · ${Math.round(1000 * rule.offset)} mm past`;
+  return text("rule.words", {
+    system: text(`rule.system.${rule.system}`),
+    nodes,
+    thickness: Number((1000 * rule.preferred_diameter).toFixed(1)),
+    past: Math.round(1000 * rule.offset),
+  });
 }
 
 /** @typedef {"nodes_kept"|"fruiting_nodes"|"preferred_diameter"|"offset"} Quantity */
@@ -44,28 +48,25 @@ const AGAIN_MS = 1000;
 const APPLIED_TIMEOUT_MS = 2500;
 
 /**
- * @type {readonly { name: Quantity, label: string, unit: string, scale: number, range: [number, number, number] }[]}
+ * @type {readonly { name: Quantity, unit: string, scale: number, range: [number, number, number] }[]}
  */
 const QUANTITIES = Object.freeze([
-  { name: "nodes_kept", label: "Nodes kept on a spur", unit: "", scale: 1, range: [1, 5, 1] },
-  { name: "fruiting_nodes", label: "Nodes on the fruiting cane", unit: "", scale: 1, range: [3, 20, 1] },
-  { name: "preferred_diameter", label: "Least thickness preferred", unit: " mm", scale: 1000, range: [3, 15, 0.5] },
-  { name: "offset", label: "Cut past the last node", unit: " mm", scale: 1000, range: [5, 50, 1] },
+  { name: "nodes_kept", unit: "", scale: 1, range: [1, 5, 1] },
+  { name: "fruiting_nodes", unit: "", scale: 1, range: [3, 20, 1] },
+  { name: "preferred_diameter", unit: " mm", scale: 1000, range: [3, 15, 0.5] },
+  { name: "offset", unit: " mm", scale: 1000, range: [5, 50, 1] },
 ]);
 
-/** @type {readonly (readonly [PruningRule["system"], string])[]} */
-const SYSTEMS = Object.freeze([
-  ["spur", "Spur"],
-  ["guyot", "Guyot"],
-]);
+/** @type {readonly PruningRule["system"][]} */
+const SYSTEMS = Object.freeze(["spur", "guyot"]);
 
 class RpRule extends HTMLElement {
   constructor() {
     super();
     this.summary = element("span");
     this.outcome = element("p", { class: "rule-outcome", attributes: { role: "status" } });
-    this.apply = element("button", { id: "rule-apply", class: "primary", text: "Apply" });
-    this.discard = element("button", { id: "rule-discard", class: "quiet", text: "Discard" });
+    this.apply = element("button", { id: "rule-apply", class: "primary", text: text("rule.apply") });
+    this.discard = element("button", { id: "rule-discard", class: "quiet", text: text("rule.discard") });
     /** @type {Map<Quantity, { row: HTMLElement, input: HTMLInputElement, value: HTMLElement }>} */
     this.sliders = new Map();
     /** @type {HTMLInputElement[]} */
@@ -100,22 +101,22 @@ class RpRule extends HTMLElement {
   systemChoice() {
     const box = element("div", {
       class: "systems",
-      attributes: { role: "radiogroup", "aria-label": "Training system" },
+      attributes: { role: "radiogroup", "aria-label": text("rule.systems") },
     });
-    for (const [system, word] of SYSTEMS) {
+    for (const system of SYSTEMS) {
       const input = element("input", {
         id: `system-${system}`,
         attributes: { type: "radio", name: "system", value: system },
       });
       input.addEventListener("change", () => this.change({ system }));
       this.systems.push(input);
-      box.append(element("label", { attributes: { for: input.id } }, input, element("span", { text: word })));
+      box.append(element("label", { attributes: { for: input.id } }, input, element("span", { text: text(`rule.system.${system}`) })));
     }
     return box;
   }
 
   /** @param {(typeof QUANTITIES)[number]} quantity */
-  slider({ name, label, unit, scale, range: [min, max, step] }) {
+  slider({ name, unit, scale, range: [min, max, step] }) {
     const value = element("output", { class: "number" });
     const input = element("input", {
       id: `rule-${name}`,
@@ -128,7 +129,7 @@ class RpRule extends HTMLElement {
     const row = element(
       "div",
       { class: "rule-row", data: { quantity: name } },
-      element("label", { text: label, attributes: { for: input.id } }),
+      element("label", { text: text(`rule.${name}`), attributes: { for: input.id } }),
       value,
       input,
     );
@@ -147,7 +148,7 @@ class RpRule extends HTMLElement {
     const held = this.applied ?? points.get()?.rule ?? null;
     this.draft = rule && held && !same(rule, held) ? rule : null;
     this.known = false;
-    setText(this.outcome, this.draft ? "Finding out what it would change…" : "");
+    setText(this.outcome, this.draft ? text("rule.asking") : "");
     this.askIn(SETTLE_MS);
     this.draw();
   }
@@ -172,7 +173,7 @@ class RpRule extends HTMLElement {
       return;
     }
     this.known = answer.ok;
-    setText(this.outcome, answer.ok ? `If applied: ${answer.reason}` : `Not known: ${answer.reason}`);
+    setText(this.outcome, text(answer.ok ? "rule.effect" : "rule.unknown", { told: reasonText(answer.why) }));
     if (!answer.ok) this.askIn(AGAIN_MS);
     this.draw();
   }
@@ -189,7 +190,7 @@ class RpRule extends HTMLElement {
     }
     this.applied = rule;
     this.draft = null;
-    setText(this.outcome, "Applied. Undo takes it back, with the acceptances that it made void.");
+    setText(this.outcome, text("rule.applied"));
     window.setTimeout(() => {
       if (this.applied === rule) this.applied = null;
       this.draw();
@@ -209,7 +210,8 @@ class RpRule extends HTMLElement {
     this.hidden = rule === null;
     if (rule === null) return;
     const why = whyNothingOf("perception");
-    setText(this.summary, `${ruleWords(this.applied ?? held ?? rule)}${this.draft ? " · another one is tried" : ""}`);
+    const words = ruleWords(this.applied ?? held ?? rule);
+    setText(this.summary, this.draft ? text("rule.tried", { rule: words }) : words);
     for (const input of this.systems) {
       if (input.checked !== (input.value === rule.system)) input.checked = input.value === rule.system;
       setEnabled(input, why);
@@ -227,7 +229,7 @@ class RpRule extends HTMLElement {
     setEnabled(
       this.apply,
       why ?? (this.known ? null : reason("rule_effect_unknown")),
-      "From now on points are by this rule; Undo takes it back",
+      text("rule.apply_hint"),
     );
   }
 }
@@ -237,6 +239,11 @@ class RpRule extends HTMLElement {
  * @param {PruningRule} other
  */
 function same(one, other) {
-  return ruleWords(one) === ruleWords(other) && one.fruiting_nodes === other.fruiting_nodes;
+  return rounded(one) === rounded(other);
+}
+
+/** As the sliders show it. @param {PruningRule} rule */
+function rounded({ system, nodes_kept, fruiting_nodes, preferred_diameter, offset }) {
+  return [system, nodes_kept, fruiting_nodes, (1000 * preferred_diameter).toFixed(1), (1000 * offset).toFixed()].join();
 }
 customElements.define("rp-rule", RpRule);

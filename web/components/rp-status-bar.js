@@ -14,8 +14,9 @@ import {
   say,
   stateAge,
 } from "../js/state/page-state.js";
+import { reasonText } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
-import { counted, text } from "../js/state/texts.js";
+import { counted, labelOf, text } from "../js/state/texts.js";
 import { element, setText } from "../js/views/dom.js";
 import { icon, setIcon } from "../js/views/icons.js";
 
@@ -99,12 +100,12 @@ class RpStatusBar extends HTMLElement {
     leave.addEventListener("click", async () => {
       const answer = await post("api/sign-out");
       if (answer.ok) location.replace("/");
-      else say("error", text("refused", { what: text("person.leave"), why: answer.reason }));
+      else say("error", text("refused", { what: text("person.leave"), why: reasonText(answer.why) }));
     });
     drawOn([pageState], () => {
       const state = pageState.get();
       setText(name, state?.user ?? "");
-      setText(role, state && state.role !== state.user ? `· ${text(`role.${state.role}`)}` : "");
+      setText(role, state && state.role !== state.user ? `· ${labelOf(state.role)}` : "");
       name.title = state ? counted("person.pages", state.viewers) : "";
     });
     return element("div", { class: "person" }, name, role, document.createElement("rp-invite"), leave);

@@ -35,7 +35,7 @@ class RpStopBanner extends HTMLElement {
       event.preventDefault();
       // With the id of the stop shown: a newer one must not be reset unseen.
       const body = { reason: words.value.trim(), stop_id: pageState.get()?.bridge?.stop_id ?? "" };
-      if (await ask("Reset", "api/reset", body)) words.value = "";
+      if (await ask(text("stop.reset"), "api/reset", body)) words.value = "";
     });
     this.append(
       element("div", { class: "banner-head" }, icon("ESTOP_LATCHED"), element("h2", { text: text("stop.idle") }), who),

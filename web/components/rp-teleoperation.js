@@ -16,7 +16,7 @@ import { nearWords } from "../js/state/format.js";
 import { link, now, pageState, showToast } from "../js/state/page-state.js";
 import { reasonText } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
-import { text } from "../js/state/texts.js";
+import { labelOf, text } from "../js/state/texts.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
 import { holdButton } from "../js/views/hold-button.js";
 import { icon } from "../js/views/icons.js";
@@ -34,11 +34,10 @@ class RpJoints extends HTMLElement {
     const limits = fetchJson("api/robot").then((robot) => /** @type {[number, number][]} */ (robot?.arm_limits ?? []));
     for (let joint = 0; joint < 7; joint++) {
       const turn = (/** @type {1|-1} */ way) => {
-        const word = way > 0 ? "up" : "down";
         const button = element("button", {
           text: way > 0 ? "+" : "−",
-          attributes: { "aria-label": `Joint ${joint + 1} ${word}` },
-          data: { joint: String(joint + 1), way: word },
+          attributes: { "aria-label": text(way > 0 ? "joint.up" : "joint.down", { joint: joint + 1 }) },
+          data: { joint: String(joint + 1), way: way > 0 ? "up" : "down" },
         });
         const joints = /** @type {import("../js/link/messages.js").ArmVelocities} */ (
           Array.from({ length: 7 }, (_, each) => (each === joint ? way * SPEED : 0))
@@ -52,7 +51,7 @@ class RpJoints extends HTMLElement {
       };
       const [up, down] = [turn(1), turn(-1)];
       const needle = element("span", { class: "needle" });
-      const unknown = `Joint ${joint + 1}: where it is between its limits is not known yet`;
+      const unknown = text("joint.unknown", { joint: joint + 1 });
       const scale = element("div", { class: "scale", attributes: { role: "img", "aria-label": unknown } }, needle);
       const angle = element("span", { class: "number" });
       this.append(element("div", { class: "joint" }, up, scale, down, angle));
@@ -67,15 +66,16 @@ class RpJoints extends HTMLElement {
         const at = pageState.get()?.joints?.position[WHEELS + joint] ?? null;
         const [low, high] = range ?? [0, 0];
         const left = at === null || !range ? Infinity : Math.min(at - low, high - at);
-        setEnabled(up, why, `Turn joint ${joint + 1} up while held`);
-        setEnabled(down, why, `Turn joint ${joint + 1} down while held`);
+        setEnabled(up, why, text("joint.up_hint", { joint: joint + 1 }));
+        setEnabled(down, why, text("joint.down_hint", { joint: joint + 1 }));
         scale.classList.toggle("near", left < NEAR_LIMIT);
         setText(angle, at === null ? "–" : `${(at * DEGREE).toFixed(0)}°`);
         if (at === null || !range) return;
         needle.style.bottom = `${(100 * (at - low)) / (high - low)}%`;
-        const ends = `${(low * DEGREE).toFixed(0)}° to ${(high * DEGREE).toFixed(0)}°`;
-        scale.ariaLabel = `Joint ${joint + 1}: ${(at * DEGREE).toFixed(0)}° of ${ends}`;
-        scale.title = `${ends}${left < NEAR_LIMIT ? `: ${(left * DEGREE).toFixed(0)}° to its limit` : ""}`;
+        const [from, to] = [(low * DEGREE).toFixed(0), (high * DEGREE).toFixed(0)];
+        scale.ariaLabel = text("joint.at", { joint: joint + 1, angle: (at * DEGREE).toFixed(0), from, to });
+        const near = left < NEAR_LIMIT;
+        scale.title = near ? text("joint.near", { from, to, left: (left * DEGREE).toFixed(0) }) : text("joint.range", { from, to });
       });
     }
   }
@@ -85,7 +85,7 @@ customElements.define("rp-joints", RpJoints);
 class RpDrivePad extends HTMLElement {
   connectedCallback() {
     const knob = element("span", { class: "knob" });
-    const label = "Drive the base: ahead, back and around. W A S D and the arrow keys do the same.";
+    const label = text("drive.label");
     const pad = element("div", { id: "drive-pad", attributes: { role: "img", "aria-label": label } }, knob);
     const words = element("p", { class: "hint" });
     this.append(pad, words);
@@ -134,8 +134,7 @@ class RpDrivePad extends HTMLElement {
       const why = whyNoDriving();
       pad.title = why ? reasonText(why) : label;
       pad.classList.toggle("disabled", why !== null);
-      const held = gamepad.get() ? "Gamepad: hold a trigger and steer with the left stick." : "A gamepad works too.";
-      setText(words, `Drag in the pad, or hold W A S D or the arrow keys. ${held}`);
+      setText(words, `${text("drive.how")} ${text(gamepad.get() ? "drive.gamepad" : "drive.no_gamepad")}`);
     });
   }
 }
@@ -150,19 +149,11 @@ class RpTeleoperation extends HTMLElement {
       "button",
       { id: "teleop", attributes: { "aria-pressed": "false" } },
       icon("TELEOP"),
-      "Teleoperate",
+      text("teleop.toggle"),
     );
     toggle.addEventListener("click", () => setTeleoperating(!teleoperating.get()));
-    const what = choice("What moves", moving, showMoving, [
-      ["tool", "Tool", "The tool follows the gizmo, base and arm together"],
-      ["base", "Base", "Drive; the arm stands"],
-      ["joints", "Joints", "Turn one joint; the base stands"],
-    ]);
-    const frame = choice("Gizmo along", axes, showAxes, [
-      ["tool", "tool", "Arrows along the tool's own axes"],
-      ["base", "base", "Arrows ahead, left and up of the base"],
-      ["world", "world", "Arrows along the row, across it and up"],
-    ]);
+    const what = choice("part", moving, showMoving, ["tool", "base", "joints"]);
+    const frame = choice("axes", axes, showAxes, ["tool", "base", "world"]);
     const speed = element("input", {
       id: "speed-scale",
       attributes: {
@@ -171,12 +162,12 @@ class RpTeleoperation extends HTMLElement {
         max: "100",
         step: "10",
         value: "100",
-        "aria-label": "Speed by hand in per cent",
+        "aria-label": text("teleop.speed_label"),
       },
     });
     const percent = element("span", { class: "number", text: "100 %" });
     speed.addEventListener("input", () => hold.speedScale.set(Number(speed.value) / 100));
-    const pace = element("label", { class: "pace" }, "Speed", speed, percent);
+    const pace = element("label", { class: "pace" }, text("teleop.speed"), speed, percent);
 
     const holdWords = element("span", { text: text("teleop.hold") });
     const button = element(
@@ -218,7 +209,7 @@ class RpTeleoperation extends HTMLElement {
       const held = (holding && controller?.limited_by) || "";
       setText(
         words,
-        held ? text("teleop.held_back", { by: held }) : explanation(why, holding, part, nearWords(controller)),
+        held ? text("teleop.held_back", { by: labelOf(held) }) : explanation(why, holding, part, nearWords(controller)),
       );
       words.classList.toggle("warned", held !== "" || (controller?.proximity?.distance ?? 1) < NEAR);
     });
@@ -229,19 +220,20 @@ class RpTeleoperation extends HTMLElement {
  * A group of toggle buttons, one of which is pressed.
  *
  * @template {string} T
- * @param {string} label
+ * @param {"part"|"axes"} name Of its words, `teleop.NAME`, and those of each value, `teleop.NAME.VALUE`.
  * @param {import("../js/state/signals.js").Signal<T>} chosen
  * @param {(value: T) => void} choose
- * @param {readonly (readonly [T, string, string])[]} values Each with its label and title.
+ * @param {readonly T[]} values
  */
-function choice(label, chosen, choose, values) {
-  const buttons = values.map(([value, words, title]) => {
-    const button = element("button", { text: words, data: { choice: value }, attributes: { title } });
+function choice(name, chosen, choose, values) {
+  const buttons = values.map((value) => {
+    const title = text(`teleop.${name}.${value}.hint`);
+    const button = element("button", { text: text(`teleop.${name}.${value}`), data: { choice: value }, attributes: { title } });
     button.addEventListener("click", () => choose(value));
     drawOn([chosen], () => button.setAttribute("aria-pressed", String(chosen.get() === value)));
     return button;
   });
-  return element("div", { class: "choice", attributes: { role: "group", "aria-label": label } }, ...buttons);
+  return element("div", { class: "choice", attributes: { role: "group", "aria-label": text(`teleop.${name}`) } }, ...buttons);
 }
 
 /**

@@ -2,6 +2,7 @@
 
 import { dismissToast, toasts } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
+import { text } from "../js/state/texts.js";
 import { element } from "../js/views/dom.js";
 import { icon } from "../js/views/icons.js";
 
@@ -23,7 +24,7 @@ class RpToasts extends HTMLElement {
         const close = element("button", {
           class: "quiet",
           text: "×",
-          attributes: { "aria-label": "Close notice" },
+          attributes: { "aria-label": text("toast.close") },
           onclick: () => dismissToast(toast.id),
         });
         const node = element(

@@ -39,12 +39,12 @@ customElements.define("rp-placing", RpPlacing);
 
 class RpViewTools extends HTMLElement {
   connectedCallback() {
-    const presets = PRESETS.map(([preset, word, hint], index) => {
+    const presets = PRESETS.map((preset, index) => {
       const key = String(index + 1);
-      const traits = { text: word, data: { preset }, attributes: { "aria-keyshortcuts": key } };
+      const traits = { text: text(`preset.${preset}`), data: { preset }, attributes: { "aria-keyshortcuts": key } };
       const button = element("button", traits);
       button.addEventListener("click", () => placeCamera(preset));
-      drawOn([link, pageState], () => setEnabled(button, whyNoLooking(), `${hint} (key ${key})`));
+      drawOn([link, pageState], () => setEnabled(button, whyNoLooking(), text("preset.hint", { what: text(`preset.${preset}.hint`), key })));
       return button;
     });
     const measure = element("button", { id: "measure", text: text("measure.begin"), attributes: { "aria-keyshortcuts": "M" } });
@@ -63,10 +63,10 @@ class RpViewTools extends HTMLElement {
     };
     open.addEventListener("click", () => show(list.hidden === true));
     this.addEventListener("keydown", (event) => event.key === "Escape" && show(false));
-    for (const [layer, word] of LAYERS) {
+    for (const layer of LAYERS) {
       const box = element("input", { data: { layer }, attributes: { type: "checkbox" } });
       box.addEventListener("change", () => showLayer(layer, box.checked));
-      list.append(element("label", {}, box, word));
+      list.append(element("label", {}, box, text(`layer.${layer}`)));
       drawOn([layers], () => {
         box.checked = layers.get().has(layer);
       });
@@ -75,7 +75,7 @@ class RpViewTools extends HTMLElement {
     this.append(
       element(
         "div",
-        { class: "tools", attributes: { role: "toolbar", "aria-label": "3-D view" } },
+        { class: "tools", attributes: { role: "toolbar", "aria-label": text("layers.tools") } },
         ...presets,
         measure,
         open,

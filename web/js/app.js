@@ -31,8 +31,10 @@ import { initViewTools } from "./control/view-tools.js";
 import { socket } from "./link/socket.js";
 import { now, points } from "./state/page-state.js";
 import { explainDisabled } from "./views/disabled-reasons.js";
+import { fillTexts } from "./views/dom.js";
 import { recordHistory } from "./views/history.js";
 
+fillTexts(document);
 explainDisabled(document);
 listenForSpace(window);
 initTeleoperation();

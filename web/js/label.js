@@ -6,6 +6,8 @@ import "../components/rp-label-list.js";
 import "../components/rp-label-tools.js";
 import { listenForLabelKeys } from "./label/keys.js";
 import { begin } from "./label/session.js";
+import { text } from "./state/texts.js";
 
+document.title = `${text("label.title")} · Rolling Panda`;
 listenForLabelKeys(window);
 void begin();

@@ -2,6 +2,12 @@
 // once.
 
 import { post } from "./link/api.js";
+import { reasonText } from "./state/reasons.js";
+import { text } from "./state/texts.js";
+import { fillTexts } from "./views/dom.js";
+
+document.title = text("sign_in.title");
+fillTexts(document);
 
 const progress = /** @type {HTMLElement} */ (document.getElementById("progress"));
 const hint = /** @type {HTMLElement} */ (document.getElementById("token-hint"));
@@ -23,15 +29,14 @@ async function withPassword() {
 
 /** @param {object} body */
 async function signIn(body) {
-  progress.textContent = "Signing in…";
+  progress.textContent = text("sign_in.signing_in");
   progress.className = "";
   const answer = await post("api/sign-in", body);
   if (answer.ok) {
     location.replace(location.pathname.replace(/sign-in$/, ""));
     return;
   }
-  const unsaid = answer.status === 401 && !answer.reason;
-  progress.textContent = `Not signed in: ${unsaid ? "the token is not valid" : answer.reason}`;
+  progress.textContent = text("sign_in.refused", { why: reasonText(answer.why) });
   progress.className = "problem";
   ask(passwordFirst);
 }
@@ -65,6 +70,6 @@ const passwordFirst = await withPassword();
 if (token) {
   await signIn({ token });
 } else {
-  progress.textContent = passwordFirst ? "" : "Open the link that the program printed, or enter its token.";
+  progress.textContent = passwordFirst ? "" : text("sign_in.how");
   ask(passwordFirst);
 }

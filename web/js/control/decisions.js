@@ -4,7 +4,7 @@ import { ask } from "../link/api.js";
 import { SURE } from "../link/messages.js";
 import { points, say } from "../state/page-state.js";
 import { signal } from "../state/signals.js";
-import { counted } from "../state/texts.js";
+import { counted, text } from "../state/texts.js";
 import { whyNot, whyNotPoint, whyNothingOf } from "./allowed.js";
 import { reason, saidText } from "../state/reasons.js";
 
@@ -50,9 +50,9 @@ export function whyNotReject(row) {
 
 /** @param {PagePoint} row */
 export async function accept(row) {
-  if (isUnknown(row)) return resolve(row, "DONE", "seen by eye");
-  const done = await send(row, "Accepting", "accept", { revision: row.point.revision, digest: row.point.digest });
-  if (done) pushUndo(`accepted ${row.point.point_id}`, () => restore(row));
+  if (isUnknown(row)) return resolve(row, "DONE", text("decision.seen"));
+  const done = await send(row, "accepting", "accept", { revision: row.point.revision, digest: row.point.digest });
+  if (done) pushUndo(text("undo.accepting", { point: row.point.point_id }), () => restore(row));
   return done;
 }
 
@@ -61,9 +61,9 @@ export async function accept(row) {
  * @param {string} reason
  */
 export async function reject(row, reason) {
-  if (isUnknown(row)) return resolve(row, "FAILED_NOT_CUT", reason || "seen by eye");
-  const done = await send(row, "Rejecting", "reject", { reason });
-  if (done) pushUndo(`rejected ${row.point.point_id}`, () => restore(row));
+  if (isUnknown(row)) return resolve(row, "FAILED_NOT_CUT", reason || text("decision.seen"));
+  const done = await send(row, "rejecting", "reject", { reason });
+  if (done) pushUndo(text("undo.rejecting", { point: row.point.point_id }), () => restore(row));
   return done;
 }
 
@@ -84,12 +84,12 @@ export function confidentPoints() {
 /** Accept all confident points. */
 export async function acceptAll() {
   const open = confidentPoints();
-  const done = await ask("Accepting all", "api/points/accept-all", { confidence: SURE });
+  const done = await ask(text("decision.accepting_all"), "api/points/accept-all", { confidence: SURE });
   if (done) {
     pushUndo(counted("undo.accepted", open.length), async () => {
       // Points that were cut or decided again since are left alone.
       const accepted = open.map((row) => now(row)).filter(isAccepted);
-      const back = await Promise.all(accepted.map((row) => row && send(row, "Taking back", "reconsider", {})));
+      const back = await Promise.all(accepted.map((row) => row && send(row, "reconsidering", "reconsider", {})));
       return back.every(Boolean);
     });
   }
@@ -111,9 +111,9 @@ export function whyNotMove(row) {
  * @param {number} millimetres Along the cane, away from the cordon.
  */
 export async function move(row, millimetres) {
-  const done = await send(row, "Moving", "move", { along: millimetres / 1000 });
-  const words = `moved ${row.point.point_id} by ${millimetres} mm`;
-  if (done) pushUndo(words, () => send(row, "Moving back", "move", { along: -millimetres / 1000 }));
+  const done = await send(row, "moving", "move", { along: millimetres / 1000 });
+  const words = text("undo.moving", { point: row.point.point_id, distance: millimetres });
+  if (done) pushUndo(words, () => send(row, "moving_back", "move", { along: -millimetres / 1000 }));
   return done;
 }
 
@@ -122,7 +122,7 @@ export async function undo() {
   const last = decisions.get().at(-1);
   if (!last) return;
   decisions.set(decisions.get().slice(0, -1));
-  if (await last.undo()) say("info", `Taken back: ${last.words}.`);
+  if (await last.undo()) say("info", text("undo.done", { words: last.words }));
 }
 
 /** Why there is nothing to undo. */
@@ -146,10 +146,10 @@ export function pushUndo(words, back) {
 async function restore(before) {
   const { state, reason } = before.entry;
   if (isAccepted(before)) {
-    return send(before, "Accepting", "accept", { revision: before.point.revision, digest: before.point.digest });
+    return send(before, "accepting", "accept", { revision: before.point.revision, digest: before.point.digest });
   }
-  if (state === "REJECTED") return send(before, "Rejecting", "reject", { reason: saidText(reason) });
-  return send(before, "Taking back", "reconsider", {});
+  if (state === "REJECTED") return send(before, "rejecting", "reject", { reason: saidText(reason) });
+  return send(before, "reconsidering", "reconsider", {});
 }
 
 /**
@@ -158,18 +158,18 @@ async function restore(before) {
  * @param {string} reason
  */
 function resolve(row, outcome, reason) {
-  return send(row, "Saying the end of", "resolve", { outcome, reason });
+  return send(row, "resolving", "resolve", { outcome, reason });
 }
 
 /**
  * @param {PagePoint} row
- * @param {string} what
+ * @param {string} what Of its words, `decision.WHAT`.
  * @param {string} action
  * @param {object} body
  */
 function send(row, what, action, body) {
   const name = row.point.point_id;
-  return ask(`${what} ${name}`, `api/points/${encodeURIComponent(name)}/${action}`, body);
+  return ask(text(`decision.${what}`, { point: name }), `api/points/${encodeURIComponent(name)}/${action}`, body);
 }
 
 /** @param {PagePoint} row */

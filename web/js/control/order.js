@@ -61,12 +61,12 @@ export async function moveTo(pointId, to) {
   const rest = workOrder().filter((row) => row.point.point_id !== pointId);
   const before = rest[to]?.point.point_id ?? "";
   const revision = pageState.get()?.controller?.order.revision ?? 0;
-  return ask(`Moving ${pointId}`, `api/points/${encodeURIComponent(pointId)}/work-before`, { before, revision });
+  return ask(text("decision.moving", { point: pointId }), `api/points/${encodeURIComponent(pointId)}/work-before`, { before, revision });
 }
 
 export async function resetOrder() {
   const revision = pageState.get()?.controller?.order.revision ?? 0;
-  return ask("The plan's order", "api/order/planners", { revision });
+  return ask(text("order.reset"), "api/order/planners", { revision });
 }
 
 /**
@@ -84,5 +84,5 @@ export function whyNotTurn(row) {
  */
 export function turnApproach(row, azimuth) {
   const name = row.point.point_id;
-  return ask(`Turning the approach to ${name}`, `api/points/${encodeURIComponent(name)}/approach`, { azimuth });
+  return ask(text("order.turning", { point: name }), `api/points/${encodeURIComponent(name)}/approach`, { azimuth });
 }

@@ -3,6 +3,7 @@
 import { post } from "../link/api.js";
 import { socket } from "../link/socket.js";
 import { link, pageState, say, showToast } from "../state/page-state.js";
+import { reasonText } from "../state/reasons.js";
 import { signal } from "../state/signals.js";
 import { text } from "../state/texts.js";
 import { whyNothingOf } from "./allowed.js";
@@ -33,12 +34,12 @@ export function setPlacing(on) {
 export async function placePoint(path, body) {
   const answer = await post(path, body);
   if (answer.ok) {
-    const point = String(answer.values?.point ?? "");
+    const point = String(answer.why?.values.find(([name]) => name === "point")?.[1] ?? "");
     select(point);
-    showToast("info", answer.reason);
+    showToast("info", reasonText(answer.why));
     return point;
   }
-  const words = text("placing.refused", { why: answer.reason });
+  const words = text("placing.refused", { why: reasonText(answer.why) });
   if (answer.status === 409) showToast("warning", words);
   else say("error", words);
   return "";

@@ -3,6 +3,7 @@
 import { ask } from "../link/api.js";
 import { socket } from "../link/socket.js";
 import { preview } from "../state/page-state.js";
+import { text } from "../state/texts.js";
 import { signal } from "../state/signals.js";
 import { whyNot, whyNothing } from "./allowed.js";
 import { reason } from "../state/reasons.js";
@@ -39,16 +40,16 @@ export function whyNoApproval() {
 /** @param {string} pointId Empty for all of the work. */
 export function askPreview(pointId) {
   hidePreview();
-  return ask("Preview", "api/preview", { point_id: pointId });
+  return ask(text("preview.all"), "api/preview", { point_id: pointId });
 }
 
 export function approvePreview() {
-  return ask("Approving the preview", "api/preview/approve", { preview_hash: preview.get()?.preview_hash ?? "" });
+  return ask(text("preview.approving"), "api/preview/approve", { preview_hash: preview.get()?.preview_hash ?? "" });
 }
 
 /** @param {boolean} required */
 export function requirePreview(required) {
-  return ask("Previews", "api/preview/required", { required });
+  return ask(text("preview.required"), "api/preview/required", { required });
 }
 
 /** Show a moment in the 3-D view. @param {number} time */

@@ -3,6 +3,7 @@
 import { post } from "../link/api.js";
 import { clockWords } from "../state/format.js";
 import { say } from "../state/page-state.js";
+import { reasonText } from "../state/reasons.js";
 import { signal } from "../state/signals.js";
 import { text } from "../state/texts.js";
 
@@ -22,7 +23,7 @@ const UNCONFIRMED = 503;
 /** @param {string} reason */
 export async function stopRobot(reason) {
   stopProgress.set("sending");
-  let refusal = "";
+  let refusal = /** @type {import("../state/reasons.js").Reason|null} */ (null);
   let unconfirmed = 0;
   for (let attempt = 0; attempt < TRIES; attempt++) {
     // At the root path: stops every robot of this server.
@@ -31,12 +32,12 @@ export async function stopRobot(reason) {
       stopProgress.set("sent");
       return;
     }
-    refusal = answer.reason;
+    refusal = answer.why;
     if (answer.status === UNCONFIRMED) unconfirmed += 1;
     if (answer.status === 401 || unconfirmed > 1) break;
   }
   stopProgress.set("failed");
-  say("error", text(unconfirmed > 0 ? "stop.not_confirmed" : "stop.not_through", { why: refusal }));
+  say("error", text(unconfirmed > 0 ? "stop.not_confirmed" : "stop.not_through", { why: reasonText(refusal) }));
 }
 
 /**
@@ -54,7 +55,7 @@ export function listenForSpace(target) {
   target.addEventListener(
     "keydown",
     (event) => {
-      if (swallow(event) && !event.repeat) void stopRobot("space bar");
+      if (swallow(event) && !event.repeat) void stopRobot(text("stop.by_space"));
     },
     { capture: true },
   );

@@ -10,25 +10,13 @@ import { isTyping } from "./stop.js";
 /** @typedef {import("../link/messages.js").Layer} Layer */
 
 /**
- * Each with its word and what it does; the keys 1 to 4 do the same.
+ * The keys 1 to 4 do the same.
  *
- * @type {readonly (readonly [CameraPreset, string, string])[]}
+ * @type {readonly CameraPreset[]}
  */
-export const PRESETS = Object.freeze([
-  ["follow", "Follow", "Look over the robot along the row, and go along"],
-  ["row", "Row", "Stand back and see some vines"],
-  ["tool", "Tool", "Look at the tool from near"],
-  ["top", "Top", "Look down on robot and row"],
-]);
-/** @type {readonly (readonly [Layer, string])[]} */
-export const LAYERS = Object.freeze([
-  ["plant", "Vines as perceived"],
-  ["points", "Pruning points"],
-  ["trail", "Trail of the tool"],
-  ["camera", "Camera and its image"],
-  ["cloud", "Point cloud of the camera"],
-  ["simulated", "Simulated row, seen or not"],
-]);
+export const PRESETS = Object.freeze(["follow", "row", "tool", "top"]);
+/** @type {readonly Layer[]} */
+export const LAYERS = Object.freeze(["plant", "points", "trail", "camera", "cloud", "simulated"]);
 const STORAGE_KEY = "layers";
 
 /** @type {import("../state/signals.js").Signal<ReadonlySet<Layer>>} */
@@ -39,7 +27,7 @@ export const measured = signal(/** @type {import("../link/messages.js").Measured
 
 /** @returns {ReadonlySet<Layer>} */
 function storedLayers() {
-  const known = new Set(LAYERS.map(([layer]) => layer));
+  const known = new Set(LAYERS);
   const kept = /** @type {Layer[]} */ (
     (localStorage.getItem(STORAGE_KEY) ?? "plant,points,trail,simulated").split(",")
   );
@@ -95,7 +83,7 @@ export function listenForViewKeys(target) {
   target.addEventListener("keydown", (event) => {
     if (event.repeat || event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target)) return;
     const preset = PRESETS[Number(event.key) - 1];
-    if (preset) placeCamera(preset[0]);
+    if (preset) placeCamera(preset);
     else if (event.code === "KeyM") setMeasuring(!measuring.get());
     else if (event.key === "Escape") setMeasuring(false);
   });

@@ -4,10 +4,12 @@ import { link, say, showToast } from "../state/page-state.js";
 import { reason, reasonText } from "../state/reasons.js";
 import { text } from "../state/texts.js";
 
+/** @typedef {import("../state/reasons.js").Reason} Reason */
+
 /**
- * `status` is 0 if the server was not reached; `values` are those of the reason by name; `link` answers an invitation.
+ * `status` is 0 if the server was not reached; `why` may be what an accepted request does; `link` answers an invitation.
  *
- * @typedef {{ ok: boolean, reason: string, status: number, values?: Record<string, any>, link?: string }} Answer
+ * @typedef {{ ok: boolean, why: Reason|null, status: number, link?: string }} Answer
  */
 
 /**
@@ -28,7 +30,7 @@ export async function post(path, body = {}, timeoutMs = 4000) {
       signal: AbortSignal.timeout(timeoutMs),
     });
   } catch {
-    return { ok: false, reason: reasonText(reason("server_unreachable")), status: 0 };
+    return { ok: false, why: reason("server_unreachable"), status: 0 };
   }
   if (response.status === 401) link.set({ status: "signed-out", attempts: 0 });
   return { ...(await answerOf(response)), status: response.status };
@@ -45,7 +47,7 @@ export async function post(path, body = {}, timeoutMs = 4000) {
 export async function ask(what, path, body) {
   const answer = await post(path, body);
   if (answer.ok) return true;
-  const words = text("refused", { what, why: answer.reason });
+  const words = text("refused", { what, why: reasonText(answer.why) });
   // Refusals (409) and timeouts (503) of the controller reach the log through the server; others are logged here.
   if (answer.status === 409) showToast("warning", words);
   else if (answer.status === 503) showToast("error", words);
@@ -79,7 +81,7 @@ export async function isSignedIn() {
 
 /**
  * @param {Response} response
- * @returns {Promise<{ ok: boolean, reason: string, values?: Record<string, any>, link?: string }>}
+ * @returns {Promise<{ ok: boolean, why: Reason|null, link?: string }>}
  */
 async function answerOf(response) {
   /** @type {any} */
@@ -89,17 +91,27 @@ async function answerOf(response) {
   } catch {
     // Not JSON: the status has to do.
   }
-  const told = typeof body?.code === "string" ? reasonText(reasonOf(body)) : (body?.reason ?? "");
-  const given = { values: body?.values ?? {}, link: typeof body?.link === "string" ? body.link : "" };
-  if (response.ok) return { ok: body?.ok !== false, reason: told, ...given };
-  return { ok: false, reason: told || reasonText(reason("server_answered", { status: response.status })) };
+  const why = reasonIn(body);
+  if (!response.ok) return { ok: false, why: why ?? reason("server_answered", { status: response.status }) };
+  return { ok: body?.ok !== false, why, link: typeof body?.link === "string" ? body.link : "" };
 }
 
 /**
- * The reason of a refusal, whose values an answer has by name.
+ * The reason in an answer; null without one.
+ *
+ * @param {any} body
+ * @returns {Reason|null}
+ */
+export function reasonIn(body) {
+  if (typeof body?.code === "string") return reasonOf(body);
+  return body?.reason ? reason("said", { text: String(body.reason) }) : null;
+}
+
+/**
+ * A reason whose values an answer has by name.
  *
  * @param {{code: string, values: Record<string, any>}} body
- * @returns {import("../state/reasons.js").Reason}
+ * @returns {Reason}
  */
 function reasonOf({ code, values }) {
   const plain = Object.entries(values ?? {}).map(([name, value]) => [name, value?.code ? reasonOf(value) : value]);

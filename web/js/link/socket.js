@@ -1,6 +1,7 @@
 // The page's WebSocket: states in, messages out, a ping ten times a second, reconnection.
 
 import { link, points, preview, receiveEvents, receiveState, roundTrip, say } from "../state/page-state.js";
+import { text } from "../state/texts.js";
 import { isSignedIn } from "./api.js";
 
 /** @typedef {import("./messages.js").FromPage} FromPage */
@@ -97,15 +98,15 @@ class PageSocket {
     window.setTimeout(() => this.open(), link.get().status === "signed-out" ? 3000 : wait);
   }
 
-  /** @param {string} text */
-  receive(text) {
+  /** @param {string} received */
+  receive(received) {
     this.silentTurns = 0;
     /** @type {FromServer} */
     let message;
     try {
-      message = JSON.parse(text);
+      message = JSON.parse(received);
     } catch {
-      say("error", "The server sent something that is not JSON; it was ignored.");
+      say("error", text("link.not_json"));
       return;
     }
     switch (message.type) {

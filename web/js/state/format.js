@@ -1,6 +1,6 @@
 // Text for ages, units and numbers.
 
-import { text } from "./texts.js";
+import { LANGUAGE, labelOf, text } from "./texts.js";
 
 /**
  * The nearest obstacle; empty if nothing is near.
@@ -9,7 +9,7 @@ import { text } from "./texts.js";
  */
 export function nearWords(controller) {
   const near = controller?.proximity ?? null;
-  return near === null ? "" : text("near", { distance: (near.distance * 1000).toFixed(0), what: near.what });
+  return near === null ? "" : text("near", { distance: (near.distance * 1000).toFixed(0), what: labelOf(near.what) });
 }
 
 /** @param {number} seconds */
@@ -30,11 +30,17 @@ export function degrees(radians) {
   return (radians * (180 / Math.PI)).toFixed(1);
 }
 
-const CLOCK = new Intl.DateTimeFormat("en-GB", { hour: "2-digit", minute: "2-digit", second: "2-digit" });
+const CLOCK = new Intl.DateTimeFormat(LANGUAGE, { timeStyle: "medium", hourCycle: "h23" });
+const DATE = new Intl.DateTimeFormat(LANGUAGE, { dateStyle: "medium", timeStyle: "medium", hourCycle: "h23" });
 
 /** @param {number} wallTime Seconds since 1970. */
 export function clockWords(wallTime) {
   return CLOCK.format(new Date(wallTime * 1000));
+}
+
+/** @param {number} wallTime Seconds since 1970. */
+export function dateWords(wallTime) {
+  return DATE.format(new Date(wallTime * 1000));
 }
 
 /**

@@ -1,13 +1,6 @@
 // Reasons as text for people.
 
-import { labelOf, loaded } from "./texts.js";
-
-/**
- * Severity, text and advice of each reason, by its code; generated.
- *
- * @type {Readonly<Record<string, readonly [import("../link/messages.js").Severity, string, string]>>}
- */
-const REASONS = await loaded("reasons");
+import { REASONS, labelOf } from "./texts.js";
 
 /** @typedef {{code: string, values: readonly (readonly [string, string|number|Reason])[]}} Reason */
 

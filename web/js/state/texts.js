@@ -1,6 +1,11 @@
-// Words of the page, from `text/page.LANGUAGE.json`: another language is another file.
+// Words of the page, from `text/page.LANGUAGE.json` and `text/reasons.LANGUAGE.json`.
 
-const LANGUAGE = document.documentElement.lang;
+import { LANGUAGES } from "./languages.js";
+
+/** The first of the browser's languages that there are texts in. */
+export const LANGUAGE =
+  navigator.languages.flatMap((each) => [each, each.split("-")[0] ?? ""]).find((each) => LANGUAGES.includes(each)) ?? "en";
+document.documentElement.lang = LANGUAGE;
 
 /**
  * A catalogue of texts. Without it the page shows the keys, since it has to stop the robot all the same.
@@ -8,7 +13,7 @@ const LANGUAGE = document.documentElement.lang;
  * @param {"page"|"reasons"} name
  * @returns {Promise<any>}
  */
-export async function loaded(name) {
+async function loaded(name) {
   try {
     return await (await fetch(new URL(`../../text/${name}.${LANGUAGE}.json`, import.meta.url))).json();
   } catch {
@@ -16,8 +21,15 @@ export async function loaded(name) {
   }
 }
 
+const [words, reasons] = await Promise.all([loaded("page"), loaded("reasons")]);
 /** @type {Readonly<Record<string, string>>} */
-const TEXTS = await loaded("page");
+const TEXTS = words;
+/**
+ * Severity, text and advice of each reason, by its code.
+ *
+ * @type {Readonly<Record<string, readonly [import("../link/messages.js").Severity, string, string]>>}
+ */
+export const REASONS = reasons;
 const PLURALS = new Intl.PluralRules(LANGUAGE);
 
 /**
@@ -39,11 +51,16 @@ export function counted(key, count, values = {}) {
   return text(`${key}.${PLURALS.select(count)}`, { ...values, count });
 }
 
+/** What a name in a message may be of. */
+const FAMILIES = Object.freeze(["mode", "point", "command", "process", "role", "name"]);
+
 /**
- * The label of a mode or of a point's state; other names as they are.
+ * The label of a mode, a point's state, a command, a part or a kind of wood, also with a number; others as they are.
  *
  * @param {string} name
  */
 export function labelOf(name) {
-  return TEXTS[`mode.${name}`] ?? TEXTS[`point.${name}`] ?? name;
+  const [, kind = name, number = ""] = /^(.*?)( ?\d+)$/.exec(name) ?? [];
+  const family = FAMILIES.find((each) => `${each}.${kind}` in TEXTS);
+  return family ? `${TEXTS[`${family}.${kind}`]}${number}` : name;
 }

@@ -1,6 +1,7 @@
 // A disabled control shows its reason when pressed or focused, since touch has no hover.
 
 import { showToast } from "../state/page-state.js";
+import { text } from "../state/texts.js";
 import { element } from "./dom.js";
 
 const DISABLED = ':is(button, input)[aria-disabled="true"]';
@@ -70,5 +71,5 @@ function isInput(control) {
 
 /** @param {Element} control */
 function whyOf(control) {
-  return control.getAttribute("aria-description") ?? "This is not possible now";
+  return control.getAttribute("aria-description") ?? text("disabled");
 }

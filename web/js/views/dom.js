@@ -1,6 +1,7 @@
 // Building DOM elements without markup strings, so that no text can become markup.
 
 import { reasonText } from "../state/reasons.js";
+import { text } from "../state/texts.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 
@@ -62,13 +63,23 @@ export function svg(tag, attributes = {}, ...children) {
 }
 
 /**
+ * Fill in the texts of a page's own markup: of elements with `data-text` and `data-label`.
+ *
+ * @param {Document} page
+ */
+export function fillTexts(page) {
+  for (const each of page.querySelectorAll("[data-text]")) setText(each, text(String(each.getAttribute("data-text"))));
+  for (const each of page.querySelectorAll("[data-label]")) each.ariaLabel = text(String(each.getAttribute("data-label")));
+}
+
+/**
  * Set the text only if it differs, to keep selections and screen readers undisturbed.
  *
  * @param {Element} node
- * @param {string} text
+ * @param {string} words
  */
-export function setText(node, text) {
-  if (node.textContent !== text) node.textContent = text;
+export function setText(node, words) {
+  if (node.textContent !== words) node.textContent = words;
 }
 
 /**

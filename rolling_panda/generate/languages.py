@@ -1,0 +1,83 @@
+"""Languages of the page: those that `web/text/` has files of, and where the files of one differ from the English ones."""
+
+import json
+import re
+from pathlib import Path
+from typing import Final
+
+ENGLISH: Final = "en"
+#: Both files of a language: `page.en.json` and `reasons.en.json`.
+_FILES: Final = ("page", "reasons")
+#: Plural forms of CLDR. A language has those of `Intl.PluralRules`, at least `other`.
+_FORM: Final = re.compile(r"\.(zero|one|two|few|many|other)$")
+
+
+def languages(folder: Path) -> tuple[str, ...]:
+    """The languages that a folder has files of, English first."""
+    found = {path.name.split(".")[1] for name in _FILES for path in folder.glob(f"{name}.*.json")}
+    return (ENGLISH, *sorted(found - {ENGLISH}))
+
+
+def languages_module(folder: Path) -> str:
+    """Text of `web/js/state/languages.js`."""
+    return (
+        "// Made by `python -m rolling_panda.generate --write` from the files in `web/text/`.\n\n"
+        "/** Languages of the page; the first is the one without a preference. @type {readonly string[]} */\n"
+        f"export const LANGUAGES = Object.freeze({json.dumps(languages(folder))});\n"
+    )
+
+
+def problems(folder: Path) -> list[str]:
+    """Where the files of a language have another key, severity or placeholder than the English ones."""
+    found = []
+    for language in languages(folder)[1:]:
+        for name in _FILES:
+            file = f"{name}.{language}.json"
+            if (folder / file).exists():
+                english, other = (_read(folder / f"{name}.{each}.json") for each in (ENGLISH, language))
+                found.extend(f"{file}: {problem}" for problem in _differences(english, other))
+            else:
+                found.append(f"{file} is missing")
+    return found
+
+
+def _read(path: Path) -> dict[str, list[str]]:
+    rows = json.loads(path.read_text(encoding="utf-8"))
+    return {key: ["", row, ""] if isinstance(row, str) else row for key, row in rows.items()}
+
+
+def _differences(english: dict[str, list[str]], other: dict[str, list[str]]) -> list[str]:
+    counted = {_FORM.sub("", key) for key in english if key.endswith(".one")}
+    forms = {match[1] for key in other if (match := _FORM.search(key)) and _FORM.sub("", key) in counted} | {"other"}
+    # What each key has to correspond to in English.
+    wanted = {key: key for key in english if _FORM.sub("", key) not in counted}
+    wanted |= {f"{group}.{form}": f"{group}.other" for group in counted for form in forms}
+    missing = [f"{key} is missing" for key in sorted(wanted.keys() - other.keys())]
+    extra = [f"{key} is not in English" for key in sorted(other.keys() - wanted.keys())]
+    return [
+        *missing,
+        *extra,
+        *(
+            f"{key}: {why}"
+            for key in sorted(wanted.keys() & other.keys())
+            for why in _of(english[wanted[key]], other[key])
+        ),
+    ]
+
+
+def _of(english: list[str], other: list[str]) -> list[str]:
+    severity, text, act = english
+    their_severity, their_text, their_act = other
+    named, theirs = _placeholders(text), _placeholders(their_text)
+    # A plural form may say the count in words.
+    lacking, added = named - theirs - {"{count}"}, (theirs - named) | _placeholders(their_act)
+    return [
+        *([f"its severity is {severity}"] if severity != their_severity else []),
+        *(f"it lacks {name}" for name in sorted(lacking)),
+        *(f"it has {name} too many" for name in sorted(added)),
+        *(["a text is empty"] if (bool(text), bool(act)) != (bool(their_text), bool(their_act)) else []),
+    ]
+
+
+def _placeholders(text: str) -> set[str]:
+    return set(re.findall(r"\{[^}]*\}", text))
