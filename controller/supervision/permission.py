@@ -73,7 +73,7 @@ def refusal(command: Command, now: float, situation: Situation) -> Reason | None
         if refused is not None:
             return refused
     if command.modes and mode not in command.modes:
-        return reasons.wrong_mode(command.name, " and ".join(command.modes), mode)
+        return reasons.wrong_mode(command.name, ", ".join(command.modes), mode)
     return next((why for each in command.conditions if (why := _missing(each, situation)) is not None), None)
 
 

@@ -64,7 +64,7 @@ def stale(root: Path = ROOT) -> list[Path]:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Write the files, or report those that are out of date and what differs between languages; returns the exit code."""
+    """Write the files, or report those that are out of date and what languages differ in; returns the exit code."""
     parser = argparse.ArgumentParser(prog="python -m rolling_panda.generate", description=__doc__)
     choice = parser.add_mutually_exclusive_group(required=True)
     choice.add_argument("--check", action="store_true", help="exit with 1 when a file is out of date")

@@ -1,4 +1,4 @@
-"""Languages of the page: those that `web/text/` has files of, and where the files of one differ from the English ones."""
+"""Languages of the page: those that `web/text/` has files of, and what one lacks that English has, or the reverse."""
 
 import json
 import re
@@ -29,7 +29,7 @@ def languages_module(folder: Path) -> str:
 
 def problems(folder: Path) -> list[str]:
     """Where the files of a language have another key, severity or placeholder than the English ones."""
-    found = []
+    found: list[str] = []
     for language in languages(folder)[1:]:
         for name in _FILES:
             file = f"{name}.{language}.json"
@@ -47,36 +47,29 @@ def _read(path: Path) -> dict[str, list[str]]:
 
 
 def _differences(english: dict[str, list[str]], other: dict[str, list[str]]) -> list[str]:
-    counted = {_FORM.sub("", key) for key in english if key.endswith(".one")}
+    groups = {_FORM.sub("", key) for key in english}
+    counted = {group for group in groups if {f"{group}.one", f"{group}.other"} <= english.keys()}
     forms = {match[1] for key in other if (match := _FORM.search(key)) and _FORM.sub("", key) in counted} | {"other"}
     # What each key has to correspond to in English.
     wanted = {key: key for key in english if _FORM.sub("", key) not in counted}
     wanted |= {f"{group}.{form}": f"{group}.other" for group in counted for form in forms}
-    missing = [f"{key} is missing" for key in sorted(wanted.keys() - other.keys())]
-    extra = [f"{key} is not in English" for key in sorted(other.keys() - wanted.keys())]
-    return [
-        *missing,
-        *extra,
-        *(
-            f"{key}: {why}"
-            for key in sorted(wanted.keys() & other.keys())
-            for why in _of(english[wanted[key]], other[key])
-        ),
-    ]
+    found = [f"{key} is missing" for key in sorted(wanted.keys() - other.keys())]
+    found += [f"{key} is not in English" for key in sorted(other.keys() - wanted.keys())]
+    for key in sorted(wanted.keys() & other.keys()):
+        # A plural form may say the count in words.
+        unsaid = {"{count}"} if _FORM.sub("", key) in counted else set[str]()
+        found += [f"{key}: {why}" for why in _changes(english[wanted[key]], other[key], unsaid)]
+    return found
 
 
-def _of(english: list[str], other: list[str]) -> list[str]:
-    severity, text, act = english
-    their_severity, their_text, their_act = other
-    named, theirs = _placeholders(text), _placeholders(their_text)
-    # A plural form may say the count in words.
-    lacking, added = named - theirs - {"{count}"}, (theirs - named) | _placeholders(their_act)
-    return [
-        *([f"its severity is {severity}"] if severity != their_severity else []),
-        *(f"it lacks {name}" for name in sorted(lacking)),
-        *(f"it has {name} too many" for name in sorted(added)),
-        *(["a text is empty"] if (bool(text), bool(act)) != (bool(their_text), bool(their_act)) else []),
-    ]
+def _changes(english: list[str], other: list[str], unsaid: set[str]) -> list[str]:
+    (severity, *texts), (their_severity, *their_texts) = english, other
+    found = [] if severity == their_severity else [f"its severity is {severity}"]
+    for text, theirs in zip(texts, their_texts, strict=True):
+        found += [f"it lacks {name}" for name in sorted(_placeholders(text) - _placeholders(theirs) - unsaid)]
+        found += [f"it has {name} too many" for name in sorted(_placeholders(theirs) - _placeholders(text))]
+        found += ["a text is empty"] if bool(text) and not theirs else []
+    return found
 
 
 def _placeholders(text: str) -> set[str]:

@@ -50,7 +50,7 @@ ALLOWED = {
 
 
 def _refused(mode: m.Mode) -> dict[str, m.Reason]:
-    return {name: reasons.wrong_mode(name, "another mode", mode) for name in (*COMMAND_NAMES, HOLD)}
+    return {name: reasons.wrong_mode(name, "PAUSED", mode) for name in (*COMMAND_NAMES, HOLD)}
 
 
 def controller(mode: m.Mode = "READY", reason: str = "armed by Ada", **changes: Any) -> m.ControllerState:
@@ -238,7 +238,7 @@ class PlayedServer:
         return page_messages.PagePoints(
             points=self.points,
             undecided_sites=self.undecided_sites,
-            segmenter="simulated labels",
+            segmenter="simulator labels",
             frames=12,
             image_size=(480, 360),
             rule=self.rule,

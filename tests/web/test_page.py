@@ -109,7 +109,7 @@ def test_a_greyed_button_does_nothing_and_says_why_to_a_finger(page: Page, serve
 
 def test_it_says_that_it_is_a_simulation_and_what_tells_wood_from_wire(page: Page, server: PlayedServer) -> None:
     expect(page.locator("rp-camera .panel-head")).to_contain_text("simulation")
-    expect(page.locator("rp-queue .panel-head")).to_contain_text("simulated labels")
+    expect(page.locator("rp-queue .panel-head")).to_contain_text("simulator labels")
     server.bridge = bridge(kind="real")
     expect(page.locator("rp-camera .panel-head")).not_to_contain_text("simulation")
 

@@ -27,5 +27,5 @@ def test_a_recording_is_named_moved_in_and_tells_who_accepted_which(page: Page, 
         {"position_s": 90, "playing": True},
     ]
     page.click("rp-replay summary")
-    expect(page.locator("#replay-accepted li")).to_have_text(["p2: Ada · accepted"])
+    expect(page.locator("#replay-accepted li")).to_have_text(["p2: Ada · Accepted"])
     expect(page.locator("rp-queue")).to_be_in_viewport()

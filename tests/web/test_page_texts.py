@@ -13,6 +13,7 @@ from playwright.sync_api import Page, expect
 from controller.supervision.permission import HOLD
 from controller.whole_body.collision_geometry import GROUND, part_of, robot_geometry
 from perception.dataset.dataset import VALUES
+from perception.segmentation.segmenter import LabelImageSegmenter, NoSegmenter
 from rolling_panda import messages as m
 from rolling_panda.commands import COMMANDS
 from rolling_panda.generate.description import union_members
@@ -78,12 +79,13 @@ FAMILIES: dict[str, Sequence[str]] = {
     "teleop.${}.${}.hint": CHOICES,
     "${}.title": ("charts", "report"),
     # What a message names.
-    "name.${}": {
+    "name.${}": (
         *(event.value for event in Event),
         *get_args(types.WoodClass),
         *(part.rstrip("0123456789") for part in PARTS),
-        "joint",
-    },
+        *("joint", LabelImageSegmenter.name, NoSegmenter.name),
+        *("at the cut", "at the stand-off", "clear of it"),
+    ),
 }
 
 
@@ -152,8 +154,8 @@ SHOWN = re.compile(
 )
 #: What is compared, styled or looked up instead of being shown.
 UNSEEN = re.compile(
-    r"(?:class: |[!=]== |case |whyNot\(|querySelector(?:All)?\(|closest\??\.?\(|translate = |headers\.get\(|data: \{ |undecidedList\(|"
-    r'-controls": |name: |const PARTS = |const DISABLED = |getAttribute\()$'
+    r"(?:class: |[!=]== |case |whyNot\(|querySelector(?:All)?\(|closest\??\.?\(|translate = |headers\.get\(|data: \{ |"
+    r'undecidedList\(|-controls": |name: |const PARTS = |const DISABLED = |getAttribute\()$'
 )
 PROPER = {"Rolling Panda", "\0 · Rolling Panda", "\0 min \0 s", "\0 min", "\0 s", "\0 mm", "\0 / \0 s"}
 KEYS = {"H", "Escape", "Tab", "Enter", "Space", "Arrow"}

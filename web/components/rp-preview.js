@@ -18,7 +18,7 @@ import {
 } from "../js/control/preview.js";
 import { link, now, pageState, points, preview, selected } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
-import { counted, text } from "../js/state/texts.js";
+import { counted, labelOf, text } from "../js/state/texts.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
 import { reason, reasonText } from "../js/state/reasons.js";
 
@@ -133,7 +133,7 @@ function least(cuts) {
   const margin = Math.min(...cuts.map((cut) => cut.joint_margin));
   return text("preview.least", {
     clearance: Math.round(1000 * nearest.clearance),
-    between: nearest.between.join("–"),
+    between: nearest.between.map(labelOf).join("–"),
     omega: omega.toFixed(3),
     margin: ((180 / Math.PI) * margin).toFixed(0),
   });

@@ -17,7 +17,7 @@ import { SURE } from "../js/link/messages.js";
 import { link, now, pageState, points, revealCount, selected, staleWords } from "../js/state/page-state.js";
 import { keyOf, reason } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
-import { counted, text } from "../js/state/texts.js";
+import { counted, labelOf, text } from "../js/state/texts.js";
 import { element, panelHead, setAttribute, setEnabled, setText } from "../js/views/dom.js";
 import { icon } from "../js/views/icons.js";
 import { undecidedList } from "../js/views/undecided-sites.js";
@@ -85,7 +85,7 @@ class RpQueue extends HTMLElement {
       const words = staleWords("controller", "perception");
       setText(note, words);
       this.classList.toggle("stale", words !== "");
-      setText(source, page?.segmenter ?? "");
+      setText(source, labelOf(page?.segmenter ?? ""));
       setText(empty, emptyWords());
       // States arrive ten times a second; rows depend on the points and on what is allowed.
       this.markActive(pageState.get()?.controller?.active_point_id ?? "");

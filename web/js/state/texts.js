@@ -55,11 +55,16 @@ export function counted(key, count, values = {}) {
 const FAMILIES = Object.freeze(["mode", "point", "command", "process", "role", "name"]);
 
 /**
- * The label of a mode, a point's state, a command, a part or a kind of wood, also with a number; others as they are.
+ * The labels of modes, states of points, commands, parts or kinds of wood, also with a number; others as they are.
  *
- * @param {string} name
+ * @param {string} names Separated by commas.
  */
-export function labelOf(name) {
+export function labelOf(names) {
+  return names.split(", ").map(label).join(", ");
+}
+
+/** @param {string} name */
+function label(name) {
   const [, kind = name, number = ""] = /^(.*?)( ?\d+)$/.exec(name) ?? [];
   const family = FAMILIES.find((each) => `${each}.${kind}` in TEXTS);
   return family ? `${TEXTS[`${family}.${kind}`]}${number}` : name;
