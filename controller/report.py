@@ -86,4 +86,4 @@ def controller_state(
 
 
 def _proximity(nearest: Clearance) -> m.Proximity:
-    return m.Proximity(nearest.distance, " and ".join(nearest.pair)[:500])
+    return m.Proximity(nearest.distance, " – ".join(nearest.pair)[:500])

@@ -134,7 +134,9 @@ class PerceptionProcess:
             self._out.append(self._checks.popleft())
         done = self._worker.poll()
         if isinstance(done, RollingPandaError):
-            self._log_refused(done.reason if isinstance(done, CorruptFrameError) else reasons.said(str(done)), now)
+            self._log_refused(
+                done.reason if isinstance(done, CorruptFrameError) else reasons.frame_failed(str(done)), now
+            )
         elif done is not None:
             self._accept(done, now)
         frame = inbox.newest(CameraFrame)

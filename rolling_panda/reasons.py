@@ -16,6 +16,9 @@ from rolling_panda.messages.types import Reason
 
 P = ParamSpec("P")
 Severity = Literal["info", "warning", "error"]
+# Values that are words: the page has a text of each, `name.…` of `web/text/page.en.json`.
+Goal = Literal["the cut", "the stand-off", "the way back", "a place clear of the canes"]
+Place = Literal["at the cut", "at the stand-off", "clear of it"]
 
 
 @dataclass(frozen=True)
@@ -1946,6 +1949,11 @@ def frame_depth_unit_invalid(frame: float, unit_m: float, limit_m: float) -> Non
 
 
 @_reason("error", "")
+def frame_failed(detail: str) -> None:
+    """A camera picture could not be judged: {detail}."""
+
+
+@_reason("error", "")
 def frame_class_unknown(frame: float, index: float, classes: float) -> None:
     """Frame {frame:.0f} has the class {index:.0f}; there are {classes:.0f}, from 0."""
 
@@ -2310,12 +2318,12 @@ def outcome_unknown(point: str, why: Reason) -> None:
 
 
 @_reason("warning", "")
-def not_reached(goal: str, position_mm: float, rotation_deg: float) -> None:
+def not_reached(goal: Goal, position_mm: float, rotation_deg: float) -> None:
     """In the time allowed {goal} was missed by {position_mm:.1f} mm and {rotation_deg:.1f}°."""
 
 
 @_reason("warning", "")
-def not_reached_for(goal: str, position_mm: float, rotation_deg: float, cause: str) -> None:
+def not_reached_for(goal: Goal, position_mm: float, rotation_deg: float, cause: str) -> None:
     """{cause} held the robot; {goal} was missed by {position_mm:.1f} mm and {rotation_deg:.1f}°."""
 
 
@@ -2335,7 +2343,7 @@ def no_clear_posture(near: Reason) -> None:
 
 
 @_reason("warning", "")
-def too_near(place: str, distance_mm: float, part: str, other: str, needed_mm: float) -> None:
+def too_near(place: Place, distance_mm: float, part: str, other: str, needed_mm: float) -> None:
     """{place}, {distance_mm:.0f} mm would be between {part} and {other}, {needed_mm:.0f} mm are needed."""
 
 

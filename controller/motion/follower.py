@@ -1,7 +1,7 @@
 """Followers of tool motions, arm motions and teleoperation."""
 
 import math
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import pinocchio as pin
@@ -326,7 +326,11 @@ class MotionTimeout:
         return self._started is not None and now - self._started > 2.5 * self._duration + self._timeout_s
 
 
-def missed(goal: str, tracking: Tracking) -> Reason:
+#: What holds the robot where nothing is named.
+UNNAMED: Final = "an obstacle"
+
+
+def missed(goal: reasons.Goal, tracking: Tracking) -> Reason:
     """The remaining error of a motion to `goal`, and its cause."""
     left = 1e3 * tracking.position_error, float(np.degrees(tracking.rotation_error))
     if tracking.reason:

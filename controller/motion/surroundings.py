@@ -85,7 +85,7 @@ def obstacles_of(capsules: Sequence[Capsule]) -> list[Obstacle]:
     """Obstacles for the collision model from their message, named by kind, number and spur."""
     return [
         Obstacle(
-            f"{capsule.kind} {number}" + (f" of vine {capsule.vine}, spur {capsule.spur}" if capsule.spur >= 0 else ""),
+            f"{capsule.kind} {number}" + (f", vine {capsule.vine}, spur {capsule.spur}" if capsule.spur >= 0 else ""),
             capsule.kind,
             capsule.start,
             capsule.end,

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from controller.config import ControllerConfig
-from controller.motion.follower import ArmMotion, Follower, Measured, MotionTimeout, Tracking
+from controller.motion.follower import UNNAMED, ArmMotion, Follower, Measured, MotionTimeout, Tracking
 from controller.motion.tool_motion import Leg, ToolMotion
 from controller.work.posture_search import escape_pose
 from rolling_panda.model.differential_drive import Array
@@ -60,7 +60,7 @@ class Homing:
         """Give up when something has held the arm for long enough."""
         self._held_s = self._held_s + self._dt if held else 0.0
         if self._held_s > _PATIENCE_S:
-            self.blocked = tracking.reason or "an obstacle"
+            self.blocked = tracking.reason or UNNAMED
 
 
 class Withdrawal:

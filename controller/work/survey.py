@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from controller.config import ControllerConfig
-from controller.motion.follower import Follower, Measured, Tracking
+from controller.motion.follower import UNNAMED, Follower, Measured, Tracking
 from controller.whole_body.saturation import Saturation
 from controller.work.homing import Homing
 from controller.work.point_queue import PointQueue
@@ -100,7 +100,7 @@ class Survey:
         if self._moved is None or abs(x - self._moved[0]) > _LEAST:
             self._moved = x, now
         elif now - self._moved[1] > _PATIENCE_S:
-            why = reasons.survey_blocked(tracking.reason or "an obstacle")
+            why = reasons.survey_blocked(tracking.reason or UNNAMED)
             return StepResult(self._saturation.ramp(robot.sent), pause=why)
         return StepResult(tracking.xi)
 

@@ -121,7 +121,7 @@ def test_work_behind_a_post_ends_with_a_reason_and_the_rest_is_done() -> None:
     assert r.state.mode == "READY"
     assert r.ask(intents.Home(user="ada")).ok
     r.run(12.0)
-    assert text_of(reasons.homing_blocked("the distance of blades to post 0")) == r.events[-1]
+    assert text_of(reasons.homing_blocked("blades – post 0")) == r.events[-1]
     # With the base driven away from the post by hand, the way home is free.
     r.teleop = TeleopTarget(sequence=1, hold=True, user="ada", base=BaseVelocity(-0.2, 0.0))
     r.run(2.0)

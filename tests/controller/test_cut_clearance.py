@@ -71,7 +71,7 @@ def test_what_is_far_away_changes_nothing():
         (("camera", "wire 1"), SETTINGS.collision_distance),
         (("link5", "cutter"), SETTINGS.cutter_distance),
         (("link5", "base"), SETTINGS.collision_distance),
-        (("camera", "cane 3 of vine 1, spur 2"), SETTINGS.cane_distance),
+        (("camera", "cane 3, vine 1, spur 2"), SETTINGS.cane_distance),
         (("cutter", "cane 3"), SETTINGS.cutter_distance),
         (("blades", "cane 3"), SETTINGS.blade_distance),
     ],

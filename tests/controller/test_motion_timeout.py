@@ -46,7 +46,7 @@ def test_late_is_what_takes_much_longer_than_planned(timeout):
 
 
 def test_what_is_held_back_without_a_pause_is_late_soon(timeout):
-    held = {"scale": 0.0, "reason": "the distance of blades to post 0 holds the tool back"}
+    held = {"scale": 0.0, "reason": "blades – post 0"}
     noted(timeout, 2.9, **held)
     assert not timeout.late(2.9)
     noted(timeout, 0.2, **held)

@@ -50,13 +50,13 @@ def parts_near(around: Surroundings, q: np.ndarray, name: str) -> set[str]:
 
 def test_the_blades_may_touch_the_spur_that_is_cut_and_nothing_else_may() -> None:
     around = Surroundings(CollisionModel(RobotModel()))
-    first, second = "cane 0 of vine 1, spur 2", "cane 2 of vine 1, spur 3"
+    first, second = "cane 0, vine 1, spur 2", "cane 2, vine 1, spur 3"
     around.update(told(cane(1.0), post(1.0, 0.5), cane(1.04, spur=3), cane(1.0, low=1.2, high=1.3)))
     everything = parts_near(around, HOME, first)
     assert {"blades", "cutter", "camera", "link5", "base"} <= everything
     around.work_at((np.array([1.0, 0.0, 1.22]),))
     assert parts_near(around, HOME, first) == everything - {"blades"}
-    assert parts_near(around, HOME, "cane 3 of vine 1, spur 2") == everything - {"blades"}, "all of the spur"
+    assert parts_near(around, HOME, "cane 3, vine 1, spur 2") == everything - {"blades"}, "all of the spur"
     assert "blades" in parts_near(around, HOME, second) and "blades" in parts_near(around, HOME, "post 1")
     around.work_at((np.array([1.0, 0.0, 1.22]), np.array([1.04, 0.0, 1.22])))
     assert "blades" not in parts_near(around, HOME, first) | parts_near(around, HOME, second)
@@ -68,17 +68,17 @@ def test_what_is_cut_stays_known_when_canes_are_told_anew_under_other_numbers() 
     around = Surroundings(CollisionModel(RobotModel()))
     around.work_at((np.array([1.0, 0.0, 1.22]),))
     around.update(told(cane(1.0)))
-    assert "blades" not in parts_near(around, HOME, "cane 0 of vine 1, spur 2")
+    assert "blades" not in parts_near(around, HOME, "cane 0, vine 1, spur 2")
     around.update(told(cane(2.0, spur=5), cane(1.0)))
-    assert "blades" in parts_near(around, HOME, "cane 0 of vine 1, spur 5")
-    assert "blades" not in parts_near(around, HOME, "cane 1 of vine 1, spur 2")
+    assert "blades" in parts_near(around, HOME, "cane 0, vine 1, spur 5")
+    assert "blades" not in parts_near(around, HOME, "cane 1, vine 1, spur 2")
 
 
 def test_beside_a_cut_the_blades_may_push_aside_what_may_yet_be_cut_off() -> None:
     around = Surroundings(CollisionModel(RobotModel()))
     open_choice = [msgspec.structs.replace(cane(x, spur=spur), undecided=True) for x, spur in ((1.02, 3), (1.08, 4))]
     around.update(told(cane(1.0), *open_choice))
-    beside, away = "cane 1 of vine 1, spur 3", "cane 2 of vine 1, spur 4"
+    beside, away = "cane 1, vine 1, spur 3", "cane 2, vine 1, spur 4"
     assert "blades" in parts_near(around, HOME, beside)
     around.work_at((np.array([1.0, 0.0, 1.22]),))
     assert "blades" not in parts_near(around, HOME, beside) and "cutter" in parts_near(around, HOME, beside)
@@ -89,7 +89,7 @@ def test_a_cut_far_from_every_cane_exempts_none() -> None:
     around = Surroundings(CollisionModel(RobotModel()))
     around.update(told(cane(1.0)))
     around.work_at((np.array([1.06, 0.0, 1.0]),))
-    assert "blades" in parts_near(around, HOME, "cane 0 of vine 1, spur 2")
+    assert "blades" in parts_near(around, HOME, "cane 0, vine 1, spur 2")
 
 
 @pytest.mark.parametrize("method", ["hierarchy", "nullspace", "decoupled"])

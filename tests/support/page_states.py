@@ -212,8 +212,8 @@ def _by_hand_joints(page: Page, server: PlayedServer) -> None:
 
 def _held_back(page: Page, server: PlayedServer) -> None:
     _by_hand_tool(page, server)
-    near = m.Proximity(0.021, "the blades and a wire")
-    server.controller = controller("TELEOP", limited_by="link 6 and cordon 2", proximity=near)
+    near = m.Proximity(0.021, "blades – wire 3")
+    server.controller = controller("TELEOP", limited_by="link6 – cane 2, vine 1, spur 3", proximity=near)
     page.locator("#hold").dispatch_event("pointerdown", {"button": 0, "isPrimary": True, "pointerId": 1})
     expect(page.locator("#hold.held")).to_be_visible()
 

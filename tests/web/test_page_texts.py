@@ -10,11 +10,17 @@ from typing import get_args
 import pytest
 from playwright.sync_api import Page, expect
 
+from controller.motion.follower import UNNAMED
 from controller.supervision.permission import HOLD
+from controller.whole_body import hierarchy
 from controller.whole_body.collision_geometry import GROUND, part_of, robot_geometry
+from controller.whole_body.guards import axle, tipping
+from controller.whole_body.task import NOT_FINITE
+from labelling.from_decisions import NOT_A_CANE
 from perception.dataset.dataset import VALUES
 from perception.segmentation.segmenter import LabelImageSegmenter, NoSegmenter
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.commands import COMMANDS
 from rolling_panda.generate.description import union_members
 from rolling_panda.messages import page as page_messages
@@ -37,6 +43,15 @@ COLUMNS = (
 )
 CHOICES = ("part.tool", "part.base", "part.joints", "axes.tool", "axes.base", "axes.world")
 PARTS = {GROUND, *(part_of(shape.name) for shape in robot_geometry(RobotModel()).geometryObjects)}
+CONSTRAINTS = (
+    *(*hierarchy._BOUND_NAMES, *axle._NAMES, *tipping._NAMES, NOT_FINITE),
+    *("a limit of a joint or wheel", "limits that contradict each other"),
+)
+#: What the page says for a person, kept as it is.
+SAID = (
+    *(NOT_A_CANE, "wrong cane", "wrong place", "too near a wire", "leave it"),
+    *("stop button", "space bar", "seen by eye"),
+)
 #: What stands for `${…}` in a key.
 FAMILIES: dict[str, Sequence[str]] = {
     "mode.${}": (*get_args(m.Mode), "none"),
@@ -71,7 +86,6 @@ FAMILIES: dict[str, Sequence[str]] = {
     "layer.${}": get_args(page_messages.Layer),
     "preset.${}": get_args(page_messages.CameraPreset),
     "preset.${}.hint": get_args(page_messages.CameraPreset),
-    "reject.usual.${}": ("cane", "place", "wire", "leave"),
     "rule.${}": ("nodes_kept", "fruiting_nodes", "preferred_diameter", "offset"),
     "rule.system.${}": ("spur", "guyot"),
     "teleop.${}": ("part", "axes"),
@@ -83,8 +97,12 @@ FAMILIES: dict[str, Sequence[str]] = {
         *(event.value for event in Event),
         *get_args(types.WoodClass),
         *(part.rstrip("0123456789") for part in PARTS),
-        *("joint", LabelImageSegmenter.name, NoSegmenter.name),
-        *("at the cut", "at the stand-off", "clear of it"),
+        *(name.rstrip(" 1234567") for name in CONSTRAINTS),
+        *get_args(reasons.Goal),
+        *get_args(reasons.Place),
+        *SAID,
+        *(LabelImageSegmenter.name, NoSegmenter.name),
+        *("vine", "arm", UNNAMED, "the left wheel", "the right wheel"),
     ),
 }
 
@@ -162,6 +180,7 @@ KEYS = {"H", "Escape", "Tab", "Enter", "Space", "Arrow"}
 MESSAGES = {
     struct.__name__ for struct in (*union_members(page_messages.FromServer), *union_members(page_messages.FromPage))
 }
+NO_TEXTS = PROPER | KEYS | MESSAGES | {*BUTTONS, *SAID}
 
 
 def loose_texts(script: str) -> list[str]:
@@ -174,11 +193,7 @@ def loose_texts(script: str) -> list[str]:
         before = script[: token.start()].rsplit("\n", 1)[-1]
         key = re.fullmatch(r"[a-z_\0-]+(?:\.[\w\0-]+)+", words)
         shown = SHOWN.search(before) and re.search("[A-Za-z]", words) and not key
-        if (
-            (shown or PROSE.search(words))
-            and not UNSEEN.search(before)
-            and words not in PROPER | KEYS | MESSAGES | {*BUTTONS}
-        ):
+        if (shown or PROSE.search(words)) and not UNSEEN.search(before) and words not in NO_TEXTS:
             found.append(words)
     return found
 

@@ -28,11 +28,11 @@ class RpStop extends HTMLElement {
     );
     // On pointerdown, so that a finger that slides off has still stopped the robot.
     button.addEventListener("pointerdown", (event) => {
-      if (event.button === 0) void stopRobot(text("stop.by_button"));
+      if (event.button === 0) void stopRobot("stop button");
     });
     // A click without a pointer: Enter, or assistive technology.
     button.addEventListener("click", (event) => {
-      if (event.detail === 0) void stopRobot(text("stop.by_button"));
+      if (event.detail === 0) void stopRobot("stop button");
     });
     this.append(button);
     drawOn([stopProgress], () => setText(label, text(`stop.${stopProgress.get()}`)));

@@ -50,7 +50,7 @@ class CollisionGuard:
             kept[row] = self._kept(pair)
             speed[row], brake[row] = self._cane if is_cane(pair) else self._usual
         _damp(near.distance, kept, self._influence, speed, brake, self._dt, lower)
-        return Inequalities(near.normal_jacobian, lower, tuple([f"the distance of {a} to {b}" for a, b in near.pairs]))
+        return Inequalities(near.normal_jacobian, lower, tuple([f"{a} – {b}" for a, b in near.pairs]))
 
 
 @compiled(NOTHING(VECTOR, VECTOR, NUMBER, VECTOR, VECTOR, NUMBER, VECTOR))

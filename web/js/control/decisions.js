@@ -50,7 +50,7 @@ export function whyNotReject(row) {
 
 /** @param {PagePoint} row */
 export async function accept(row) {
-  if (isUnknown(row)) return resolve(row, "DONE", text("decision.seen"));
+  if (isUnknown(row)) return resolve(row, "DONE", "seen by eye");
   const done = await send(row, "accepting", "accept", { revision: row.point.revision, digest: row.point.digest });
   if (done) pushUndo(text("undo.accepting", { point: row.point.point_id }), () => restore(row));
   return done;
@@ -61,7 +61,7 @@ export async function accept(row) {
  * @param {string} reason
  */
 export async function reject(row, reason) {
-  if (isUnknown(row)) return resolve(row, "FAILED_NOT_CUT", reason || text("decision.seen"));
+  if (isUnknown(row)) return resolve(row, "FAILED_NOT_CUT", reason || "seen by eye");
   const done = await send(row, "rejecting", "reject", { reason });
   if (done) pushUndo(text("undo.rejecting", { point: row.point.point_id }), () => restore(row));
   return done;

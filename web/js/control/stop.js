@@ -55,7 +55,7 @@ export function listenForSpace(target) {
   target.addEventListener(
     "keydown",
     (event) => {
-      if (swallow(event) && !event.repeat) void stopRobot(text("stop.by_space"));
+      if (swallow(event) && !event.repeat) void stopRobot("space bar");
     },
     { capture: true },
   );

@@ -57,10 +57,13 @@ const FAMILIES = Object.freeze(["mode", "point", "command", "process", "role", "
 /**
  * The labels of modes, states of points, commands, parts or kinds of wood, also with a number; others as they are.
  *
- * @param {string} names Separated by commas.
+ * @param {string} names With commas or dashes between them.
  */
 export function labelOf(names) {
-  return names.split(", ").map(label).join(", ");
+  return names
+    .split(/(, | – )/)
+    .map((part, at) => (at % 2 ? part : label(part)))
+    .join("");
 }
 
 /** @param {string} name */
