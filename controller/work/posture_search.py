@@ -328,7 +328,11 @@ class CutClearance:
         self._surroundings.work_at((plan.poses.cut.translation,))
         within = max(settings.collision_distance + _ROOM, CLEARANCE)
         worst, found = 0.0, None
-        places = (("at the cut", plan.q_cut), ("at the stand-off", plan.q_stand_off), ("clear of it", plan.q_clear))
+        places: tuple[tuple[reasons.Place, Array], ...] = (
+            ("at the cut", plan.q_cut),
+            ("at the stand-off", plan.q_stand_off),
+            ("clear of it", plan.q_clear),
+        )
         for where, q in places:
             near = self._surroundings.model.distances(q, within)
             for distance, pair in zip(near.distance.tolist(), near.pairs, strict=True):
