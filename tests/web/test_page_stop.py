@@ -43,6 +43,7 @@ def test_a_second_stop_does_not_hide_the_first(page: Page, server: PlayedServer)
     server.stopped = tuple(StopState(process=process, stops=(BOB, ADA)) for process in ("bridge", "controller"))
     expect(banner.locator(".who")).to_contain_text(text_of(reasons.software_stop("Bob", said("space bar"))))
     expect(banner.locator(".earlier")).to_have_text(f"Before that: Ada, {clock(page, ADA)}")
+    assert banner.inner_text().count("Software stop") == 1
 
 
 def test_a_pressed_button_on_the_robot_comes_before_the_reset(page: Page, server: PlayedServer) -> None:

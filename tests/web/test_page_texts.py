@@ -25,7 +25,7 @@ from rolling_panda.commands import COMMANDS
 from rolling_panda.generate.description import union_members
 from rolling_panda.messages import page as page_messages
 from rolling_panda.messages import types
-from rolling_panda.mode_table import Event
+from rolling_panda.mode_table import Event, Who
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.resources import resource
 from tests.support.played_page import until
@@ -100,6 +100,8 @@ FAMILIES: dict[str, Sequence[str]] = {
         *(name.rstrip(" 1234567") for name in CONSTRAINTS),
         *get_args(reasons.Goal),
         *get_args(reasons.Place),
+        *(command.words for command in COMMANDS),
+        *({*get_args(Who)} - {*get_args(types.Role)}),
         *SAID,
         *(LabelImageSegmenter.name, NoSegmenter.name),
         *("vine", "arm", UNNAMED, "the left wheel", "the right wheel"),

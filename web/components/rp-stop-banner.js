@@ -14,6 +14,7 @@ import { icon, setIcon } from "../js/views/icons.js";
 class RpStopBanner extends HTMLElement {
   connectedCallback() {
     this.hidden = true;
+    const title = element("h2");
     const who = element("p", { class: "who" });
     const earlier = element("p", { class: "hint earlier" });
     const bridge = acknowledgement("bridge");
@@ -38,7 +39,7 @@ class RpStopBanner extends HTMLElement {
       if (await ask(text("stop.reset"), "api/reset", body)) words.value = "";
     });
     this.append(
-      element("div", { class: "banner-head" }, icon("ESTOP_LATCHED"), element("h2", { text: text("stop.idle") }), who),
+      element("div", { class: "banner-head" }, icon("ESTOP_LATCHED"), title, who),
       element("ul", { class: "acknowledgements" }, bridge.row, controller.row),
       earlier,
       form,
@@ -58,7 +59,9 @@ class RpStopBanner extends HTMLElement {
       // Without a link no reset is possible, and two banners leave little of the view.
       form.hidden = hint.hidden = link.get().status !== "open";
       const told = state?.bridge?.stopped_by ?? (byController ? state?.controller?.reason : null);
-      setText(who, reasonText(told) || text("stop.pressed_here"));
+      // The reason names the kind of stop.
+      setText(title, text(told ? "mode.ESTOP_LATCHED" : "stop.idle"));
+      setText(who, told ? reasonText(told) : text("stop.pressed_here"));
       const newest = state?.bridge?.stop_id ?? "";
       bridge.show(byBridge, sinceWords(state, "bridge", newest));
       controller.show(byController, sinceWords(state, "controller", newest));

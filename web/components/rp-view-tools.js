@@ -15,7 +15,7 @@ import {
 import { link, now, pageState } from "../js/state/page-state.js";
 import { reason } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
-import { text } from "../js/state/texts.js";
+import { labelOf, text } from "../js/state/texts.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
 
 class RpPlacing extends HTMLElement {
@@ -111,8 +111,8 @@ function distanceWords() {
   const far = Math.hypot(along, across, up);
   return text("measure.told", {
     far: metres(far),
-    from: told.between[0],
-    to: told.between[1],
+    from: labelOf(told.between[0]),
+    to: labelOf(told.between[1]),
     along: metres(along),
     across: metres(across),
     up: metres(up),

@@ -5,7 +5,7 @@ import { clockWords } from "../state/format.js";
 import { say } from "../state/page-state.js";
 import { reasonText } from "../state/reasons.js";
 import { signal } from "../state/signals.js";
-import { text } from "../state/texts.js";
+import { labelOf, text } from "../state/texts.js";
 
 /** @typedef {import("../link/messages.js").PageState} PageState */
 /** @typedef {import("../link/messages.js").StopRecord} StopRecord */
@@ -109,7 +109,7 @@ export function sinceWords(state, process, stopId) {
 export function earlierWords(state) {
   const earlier = latchedBy(state, "bridge").slice(1);
   if (earlier.length === 0) return "";
-  const told = earlier.slice(0, 3).map((stop) => `${stop.user || stop.source}, ${clockWords(stop.wall_time)}`);
+  const told = earlier.slice(0, 3).map((stop) => `${stop.user || labelOf(stop.source)}, ${clockWords(stop.wall_time)}`);
   const more = earlier.length - told.length;
   const stops = told.join("; ");
   return more > 0 ? text("stop.earlier_more", { stops, more }) : text("stop.earlier", { stops });
