@@ -1950,7 +1950,7 @@ def frame_depth_unit_invalid(frame: float, unit_m: float, limit_m: float) -> Non
 
 @_reason("error", "")
 def frame_failed(detail: str) -> None:
-    """A camera picture could not be judged: {detail}."""
+    """Its processing failed: {detail}."""
 
 
 @_reason("error", "")

@@ -10,6 +10,7 @@ from perception.segmentation.frame import CorruptFrameError
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.commands import SetRule
+from rolling_panda.errors import RollingPandaError
 from rolling_panda.messages.perception import Capsule, CloseUpResult, PointCrop
 from rolling_panda.messages.robot import CameraFrame, Intrinsics
 from rolling_panda.reasons import severity_of
@@ -75,6 +76,8 @@ class FakePerception:
             self.release.wait(10.0)
         if what == "corrupt":
             raise CorruptFrameError(reasons.frame_image_corrupt(frame.sequence, "depth", "it ends"))
+        if what == "singular":
+            raise RollingPandaError("no line fits")
         self.newest = m.PruningPoints(header=m.Header(), segmenter="s", frames=self.processed, points=())
         return self.newest
 
@@ -168,6 +171,14 @@ def test_a_corrupt_frame_is_told_once_and_sends_no_points(parts):
     assert [event.reason for event in events] == [reasons.perception_started(), refused]
     assert severity_of(refused) == "error"
     assert not wire.sent[POINTS.name]
+
+
+def test_an_error_in_the_processing_of_a_frame_is_told_with_its_text(parts):
+    wire, _, loop = parts
+    events = wire.sent[EVENT.name]
+    loop.see("singular", 0.0)
+    step_until(loop, lambda: len(events) == 2)
+    assert events[-1].reason == reasons.frame_refused(reasons.frame_failed("no line fits"))
 
 
 def test_new_points_and_points_that_were_cut_are_no_warnings(parts):
