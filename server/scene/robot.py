@@ -14,6 +14,7 @@ from rolling_panda.messages.supervision import PreviewMotion, PreviewRow
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import configuration
 from server.scene.meshes import Color
+from server.scene.outdoors import draw_shadow
 from server.scene.solids import Part
 
 _BASE_JOINT = "base_phi"
@@ -44,6 +45,7 @@ class SceneRobot:
             if joint != self._base:
                 names[joint] = f"{names[model.parents[joint]]}/{model.names[joint]}"
             self._frames[joint] = server.scene.add_frame(names[joint], show_axes=False)
+        draw_shadow(server.scene, "/robot")
         self._parts = [part for part in parts if len(part.faces)]
         self._meshes: list[tuple[viser.MeshHandle, Color]] = []
         for number, part in enumerate(parts):

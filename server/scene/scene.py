@@ -21,6 +21,7 @@ from server.scene.meshes import (
     drawn_kinds,
     quat_wxyz_of_axis,
 )
+from server.scene.outdoors import VineNumbers, draw_outdoors
 from server.scene.picking import (
     ClickListener,
     DistanceTool,
@@ -35,9 +36,10 @@ from server.scene.robot import PreviewGhost, SceneRobot, ToolTrail
 from server.scene.solids import Solids
 from server.scene.viser_adapter.view_server import ViewServer
 
-_SKY_TOP, _SKY_BOTTOM = np.array([22.0, 27.0, 34.0]), np.array([58.0, 66.0, 76.0])
 _CANE_LINES = "/plant/canes"
 _SELECTION = "/selection"
+#: Of the axes of perceived canes, sRGB.
+_CANE_COLOR = (120, 84, 56)
 #: The fall is animated for at most this many cuts since the last message about the row.
 _MAX_ANIMATED_CUTS = 5
 #: Radius of a falling piece of cane (m).
@@ -47,7 +49,7 @@ _PERCEIVED_MARGIN = 0.002
 #: Offset of the lines of canes, towards the robot (m): inside the wood they would be hidden.
 _CANE_LINE_OFFSET = np.array([0.0, -0.008, 0.0], dtype=np.float32)
 #: Layers of a session that has not chosen any.
-DEFAULT_LAYERS: frozenset[Layer] = frozenset({"plant", "points", "trail", "simulated"})
+DEFAULT_LAYERS: frozenset[Layer] = frozenset({"plant", "points", "trail"})
 #: Nodes of the layers that all views share; the other layers are drawn for each view.
 _SHARED_LAYERS: dict[Layer, str] = {"plant": "/plant", "simulated": "/row", "points": "/points", "trail": "/trail"}
 
@@ -98,7 +100,10 @@ class Scene:
         #: Flights of cameras to points that are not drawn yet, or of owners without an open view.
         self._pending_flights: dict[str, tuple[str, bool]] = {}
         self._plant: dict[str, list[Capsule]] = {}
-        self._draw_environment()
+        self._server.gui.configure_theme(dark_mode=False, show_logo=False, show_share_button=False)
+        self._server.gui.main_panel.minimize()
+        draw_outdoors(self._server.scene)
+        self._numbers = VineNumbers(self._server.scene)
         for layer, name in _SHARED_LAYERS.items():
             self._server.scene.add_frame(name, show_axes=False, visible=layer in DEFAULT_LAYERS)
         self._layers: dict[str, frozenset[Layer]] = {}
@@ -167,6 +172,7 @@ class Scene:
                 self._points.pop(point_id)[1].remove()
             for point_id, row in shown.items():
                 self._show_point(point_id, row)
+            self._numbers.show(points)
         for owner in list(self._selected):
             self._draw_selection(owner)
         self._start_pending_flights()
@@ -202,8 +208,8 @@ class Scene:
             self._server.scene.add_line_segments(
                 _CANE_LINES,
                 np.array(pairs, dtype=np.float32) + _CANE_LINE_OFFSET,
-                colors=(84, 172, 224),
-                thickness=2.0,
+                colors=_CANE_COLOR,
+                thickness=2.5,
                 thickness_units="screen",
             )
         else:
@@ -406,32 +412,3 @@ class Scene:
         self._clicks.detach(client_id)
         self.ghost.detach(client_id)
         self.cameras.forget(client_id)
-
-    def _draw_environment(self) -> None:
-        server, scene = self._server, self._server.scene
-        server.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
-        server.gui.main_panel.minimize()
-        scene.world_axes.visible = False
-        sky = _SKY_TOP + np.linspace(0.0, 1.0, 64)[:, None, None] * (_SKY_BOTTOM - _SKY_TOP)
-        scene.set_background_image(np.repeat(sky, 4, axis=1).astype(np.uint8), format="png")
-        # A hemisphere light: an environment map would cost twice as much to draw.
-        scene.configure_environment_map(None)
-        scene.configure_default_lights(enabled=False)
-        scene.add_light_hemisphere("/light/sky", intensity=1.6, sky_color=(214, 226, 244), ground_color=(108, 108, 92))
-        scene.add_light_directional("/light/sun", intensity=2.6, color=(255, 244, 228), position=(-3.0, -4.0, 6.0))
-        # The ground is the grid's own plane: one draw call instead of two that fill the screen.
-        scene.add_grid(
-            "/ground",
-            width=120.0,
-            height=120.0,
-            position=(0.0, 0.0, -0.004),
-            plane_color=(62, 69, 56),
-            plane_opacity=1.0,
-            cell_size=0.5,
-            section_size=1.0,
-            cell_color=(68, 76, 62),
-            section_color=(76, 84, 70),
-            fade_distance=50.0,
-            fade_strength=0.5,
-            shadow_opacity=0.0,
-        )

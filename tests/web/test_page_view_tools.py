@@ -37,17 +37,17 @@ def test_the_camera_is_placed_by_buttons_and_by_keys_also_inside_the_view(page: 
 
 
 def test_little_is_shown_until_it_is_chosen_and_the_choice_is_kept(page: Page, server: PlayedServer) -> None:
-    until(page, lambda: layers(server) == [{"plant", "points", "trail", "simulated"}])
+    until(page, lambda: layers(server) == [{"plant", "points", "trail"}])
     expect(page.locator("#layers")).to_be_hidden()
     page.locator("#show-layers").click()
     page.get_by_label("Point cloud").check()
     page.get_by_label("Trail of the tool").uncheck()
-    until(page, lambda: layers(server)[-1] == {"plant", "points", "cloud", "simulated"})
+    until(page, lambda: layers(server)[-1] == {"plant", "points", "cloud"})
     page.keyboard.press("Escape")
     expect(page.locator("#layers")).to_be_hidden()
     server.said.clear()
     page.reload()
-    until(page, lambda: layers(server) == [{"plant", "points", "cloud", "simulated"}])
+    until(page, lambda: layers(server) == [{"plant", "points", "cloud"}])
 
 
 def test_two_clicks_are_measured_and_said_and_escape_ends_it(page: Page, server: PlayedServer) -> None:

@@ -29,7 +29,7 @@ export const measured = signal(/** @type {import("../link/messages.js").Measured
 function storedLayers() {
   const known = new Set(LAYERS);
   const kept = /** @type {Layer[]} */ (
-    (localStorage.getItem(STORAGE_KEY) ?? "plant,points,trail,simulated").split(",")
+    (localStorage.getItem(STORAGE_KEY) ?? "plant,points,trail").split(",")
   );
   return new Set(kept.filter((layer) => known.has(layer)));
 }
