@@ -54,7 +54,7 @@ def _refused(mode: m.Mode) -> dict[str, m.Reason]:
 
 
 def controller(mode: m.Mode = "READY", reason: str = "armed by Ada", **changes: Any) -> m.ControllerState:
-    points = ("AcceptPoint", "RejectPoint", "ReconsiderPoint", "ResolvePoint", "AcceptAll")
+    points = ("AcceptPoint", "RejectPoint", "ReconsiderPoint", "ResolvePoint", "JudgeCut", "AcceptAll")
     state = m.ControllerState(
         header=m.Header(),
         mode=mode,

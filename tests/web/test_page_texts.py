@@ -39,7 +39,7 @@ FACTS = ("cut", "keeps", "cane", "place", "clear", "content")
 READINGS = re.findall(r'\bid: "([\w-]+)"', (WEB / "js" / "views" / "readings.js").read_text(encoding="utf-8"))
 COLUMNS = (
     *("vine", "done", "not_cut", "unknown", "unreachable", "minutes", "ended", "point", "outcome", "seconds", "user"),
-    *("when", "who", "asked", "why", "what", "mean", "vine_count", "refused"),
+    *("when", "who", "asked", "why", "what", "mean", "vine_count", "refused", "judgement"),
 )
 CHOICES = ("part.tool", "part.base", "part.joints", "axes.tool", "axes.base", "axes.world")
 PARTS = {GROUND, *(part_of(shape.name) for shape in robot_geometry(RobotModel()).geometryObjects)}

@@ -1,11 +1,14 @@
 // The session report: cuts by outcome and vine, durations, refusals, and who held control.
 
+import { whyNot } from "../js/control/allowed.js";
+import { judge } from "../js/control/decisions.js";
 import { reasonIn } from "../js/link/api.js";
 import { clockWords } from "../js/state/format.js";
 import { reasonText } from "../js/state/reasons.js";
 import { counted, labelOf, text } from "../js/state/texts.js";
-import { element, setText } from "../js/views/dom.js";
+import { element, setEnabled, setText } from "../js/views/dom.js";
 
+/** @typedef {import("../js/link/messages.js").CutReport} CutReport */
 /** @typedef {import("../js/link/messages.js").SessionReport} SessionReport */
 
 /** Refresh period while open (ms); the controller publishes it every 5 s. */
@@ -18,7 +21,7 @@ export class RpReport extends HTMLElement {
     this.words = element("p", { class: "hint", attributes: { role: "status" } });
     this.sums = element("dl", { class: "sums number" });
     this.vines = table("vines", ["vine", "done", "not_cut", "unknown", "unreachable", "minutes"]);
-    this.cuts = table("cuts", ["ended", "point", "vine", "outcome", "seconds", "user"]);
+    this.cuts = table("cuts", ["ended", "point", "vine", "outcome", "seconds", "user", "judgement"]);
     this.refusals = table("refusals", ["when", "who", "asked", "why"]);
     this.control = table("control", ["when", "who", "what"]);
     /** @type {Node[]} */
@@ -51,6 +54,26 @@ export class RpReport extends HTMLElement {
     } catch {
       setText(this.words, text("report.unreachable"));
     }
+  }
+
+  /**
+   * Button that calls a cut wrong, and right again.
+   *
+   * @param {CutReport} cut
+   */
+  judgement(cut) {
+    const wrong = cut.wrong_by !== "";
+    const press = async () => {
+      if (await judge(cut.point_id, !wrong)) await this.fetch();
+    };
+    const button = element("button", {
+      class: "quiet judgement",
+      text: text("report.wrong"),
+      attributes: { "aria-pressed": String(wrong), "aria-label": text("report.wrong_cut", { point: cut.point_id }) },
+      onclick: () => void press(),
+    });
+    setEnabled(button, whyNot("JudgeCut"), wrong ? text("report.wrong_by", { user: cut.wrong_by }) : text("report.wrong_hint"));
+    return button;
   }
 
   /** @param {SessionReport} report */
@@ -93,6 +116,7 @@ export class RpReport extends HTMLElement {
           [labelOf(cut.outcome || "CUTTING"), reasonText(cut.reason)].filter(Boolean).join(": "),
           cut.ended_at > 0 ? cut.seconds.toFixed(1) : "–",
           cut.user,
+          cut.outcome === "DONE" ? this.judgement(cut) : "",
         ]),
     );
     this.refusals.show(
@@ -113,15 +137,20 @@ function table(name, columns) {
   const head = element("tr", {}, ...columns.map((each) => element("th", { text: text(`report.column.${each}`), attributes: { scope: "col" } })));
   const empty = element("p", { class: "hint" });
   const grid = element("table", {}, element("thead", {}, head), body);
+  let shown = "";
   const box = element("section", {}, element("h3", { text: text(`report.table.${name}`) }), grid, empty);
   return {
     box,
-    /** @param {readonly (readonly (string|number)[])[]} rows */
+    /** @param {readonly (readonly (string|number|Element)[])[]} rows */
     show(rows) {
       grid.hidden = rows.length === 0;
       setText(empty, rows.length === 0 ? text(`report.none.${name}`) : "");
+      // Rows that are as before stay, and with them the focus.
+      const key = JSON.stringify(rows.map((row) => row.map((cell) => (cell instanceof Element ? cell.outerHTML : cell))));
+      if (key === shown) return;
+      shown = key;
       body.replaceChildren(
-        ...rows.map((row) => element("tr", {}, ...row.map((cell) => element("td", { text: String(cell) })))),
+        ...rows.map((row) => element("tr", {}, ...row.map((cell) => cell instanceof Element ? element("td", {}, cell) : element("td", { text: String(cell) })))),
       );
     },
   };

@@ -117,6 +117,17 @@ export async function move(row, millimetres) {
   return done;
 }
 
+/**
+ * Call a finished cut wrong, or right after all.
+ *
+ * @param {string} point
+ * @param {boolean} wrong
+ */
+export function judge(point, wrong) {
+  const what = text(wrong ? "decision.calling_wrong" : "decision.calling_right", { point });
+  return ask(what, `api/points/${encodeURIComponent(point)}/judge`, { wrong });
+}
+
 /** Undo the last decision. */
 export async function undo() {
   const last = decisions.get().at(-1);
