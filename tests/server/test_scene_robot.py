@@ -25,7 +25,10 @@ def robot(frames):
     def add_frame(name, **_):
         return frames.setdefault(name, SimpleNamespace(position=None, wxyz=None))
 
-    scene = SimpleNamespace(add_frame=add_frame, add_mesh_simple=lambda *_, **__: SimpleNamespace())
+    def draw(*_, **__):
+        return SimpleNamespace()
+
+    scene = SimpleNamespace(add_frame=add_frame, add_mesh_simple=draw, add_image=draw)
     return SceneRobot(SimpleNamespace(scene=scene, atomic=nullcontext), MODEL, [])
 
 
