@@ -53,24 +53,24 @@ def test_layers_are_those_of_one_session_and_stay_for_its_next_view(server):
     ):
         hear(other_view, replayed)
         say(other_view, CAMERA)
-        hear(other_view, shows("/row", True))
+        hear(other_view, shows("/plant", True))
         with server.socket(client, "/viser") as view:
             hear(view, replayed)
             say(view, CAMERA)
-            hear(view, shows("/row", True))
+            hear(view, shows("/plant", True))
             page.send('{"type":"ShowLayers","layers":["points"]}')
-            heard = hear(view, shows("/row", False))
-            assert any(map(shows("/plant", False), heard)) and any(map(shows("/points", True), heard))
-            never(other_view, shows("/row", False))
+            heard = hear(view, shows("/plant", False))
+            assert any(map(shows("/points", True), heard))
+            never(other_view, shows("/plant", False))
         with server.socket(client, "/viser") as view:
             hear(view, replayed)
             say(view, CAMERA)
-            hear(view, shows("/row", False))
+            hear(view, shows("/plant", False))
 
 
 def test_a_preset_moves_the_cameras_of_who_asked_alone_and_viewers_may_too(server):
     with telling(server.wire), two_views(server, role="viewer") as (page, view, other_view):
-        hear(view, shows("/row", True))
+        hear(view, shows("/plant", True))
         page.send('{"type":"PlaceCamera","preset":"top"}')
         (put,) = [message for message in hear(view, placed) if placed(message)]
         assert put["position"][2] > 3.0
@@ -85,7 +85,7 @@ def test_a_chosen_point_brings_the_cameras_of_who_chose_it_alone(server):
     far = msgspec.structs.replace(pruning_point("far"), position=(1.0, 0.75, 1.0))
     server.wire.deliver(topics.POINTS, pruning_points(far))
     with telling(server.wire), two_views(server) as (page, view, other_view):
-        hear(view, shows("/row", True))
+        hear(view, shows("/plant", True))
         page.send('{"type":"Select","point_id":"far"}')
         hear(view, looks_at(1.0))
         # Chosen before it is drawn, as where somebody has placed it: brought there once it is.
@@ -116,7 +116,7 @@ def test_two_clicks_are_measured_for_the_session_that_measures(server):
 def test_a_picture_of_the_camera_is_drawn_for_who_wants_it(server):
     with two_views(server) as (page, view, other_view):
         for each in (view, other_view):
-            hear(each, shows("/row", True))
+            hear(each, shows("/plant", True))
         page.send('{"type":"ShowLayers","layers":["camera","cloud"]}')
         hear(view, shows("/plant", False))
         server.wire.deliver(topics.CAMERA, frame(np.full((HEIGHT, WIDTH), 900)))
