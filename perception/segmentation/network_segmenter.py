@@ -83,6 +83,8 @@ class NetworkSegmenter:
         options.inter_op_num_threads = 1
         # Spinning threads would take processor time from the controller.
         options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+        # Errors only: of a network of 8 bits it warns of each number that merging its layers leaves over.
+        options.log_severity_level = 3
         try:
             content = path.read_bytes()
             self._session = onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
