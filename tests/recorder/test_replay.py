@@ -11,6 +11,7 @@ from rolling_panda import commands as intents
 from rolling_panda import topics
 from rolling_panda.commands import SeekReplay
 from rolling_panda.config import TransportConfig
+from rolling_panda.errors import ServiceError
 from rolling_panda.reasons import text_of
 from rolling_panda.transport.zenoh import Transport
 from tests.recorder.test_player import event, joints, recording
@@ -27,9 +28,19 @@ def server(endpoint: str) -> Iterator[tuple[Replay, Transport]]:
         Player(recording(event(0.35, "it begins")), "a.mcap", time.monotonic()),
     )
     until(lambda: {"bridge", "controller", "perception"} <= server.present())
+    # A process is present a moment before its services are known to the router.
+    until(lambda: _answers(server))
     yield replay, server
     replay.close()
     server.close()
+
+
+def _answers(wire: Transport) -> bool:
+    try:
+        wire.call(topics.INTENT, intents.Arm(user="ada"))
+    except ServiceError:
+        return False
+    return True
 
 
 def test_a_server_sees_the_robot_of_the_recording_and_moves_in_it(server: tuple[Replay, Transport]) -> None:
