@@ -12,7 +12,7 @@ from perception.segmentation.frame import CorruptFrameError
 from rolling_panda import messages as m
 from rolling_panda import reasons, topics
 from rolling_panda.errors import RollingPandaError
-from rolling_panda.messages.perception import CloseUpResult, Obstacles, PointCrop
+from rolling_panda.messages.perception import CloseUpResult, Obstacles, SpurPicture
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.transport.inbox import Inbox, Received, Reply, Request
 from rolling_panda.transport.runner import Runner, Wire
@@ -82,7 +82,7 @@ class _Output:
     points: m.PruningPoints
     withdrawn: tuple[m.Reason, ...]
     obstacles: Obstacles
-    crops: tuple[PointCrop, ...]
+    pictures: tuple[SpurPicture, ...]
     rejected_wood: tuple[m.Reason, ...]
     reply: Reply | None
 
@@ -107,14 +107,14 @@ class PerceptionProcess:
         self._checks: deque[CloseUpResult] = deque()
         self._worker: Worker[CameraFrame | Request, _Output] = worker(lambda job: _work(perception, job, self._checked))
         self._newest: _Output | None = None
-        self._crop_cycle: dict[tuple[str, int], PointCrop] = {}
-        """Crops in the order of their repetition, the next one first."""
+        self._picture_cycle: dict[tuple[int, int], SpurPicture] = {}
+        """Pictures by vine and spur in the order of their repetition, the next one first."""
         self._camera_rays = perception.camera_rays
         self._familiarity_unknown = perception.familiarity_unknown
         self._frame: Received[CameraFrame] | None = None
         self._submitted: Received[CameraFrame] | None = None
         self._sequence = 0
-        self._obstacles_sent = self._crop_sent = self._rejected_logged = -1e9
+        self._obstacles_sent = self._picture_sent = self._rejected_logged = -1e9
         self._started = False
         self._last_error = ""
         self._rejected_wood: tuple[m.Reason, ...] = ()
@@ -153,11 +153,11 @@ class PerceptionProcess:
         if self._newest is not None and now - self._obstacles_sent >= 1.0 / topics.OBSTACLES.rate_hz:
             self._out.append(self._newest.obstacles)
             self._obstacles_sent = now
-        if self._crop_cycle and now - self._crop_sent >= 1.0 / topics.CROPS.rate_hz:
-            key = next(iter(self._crop_cycle))
-            self._crop_cycle[key] = self._crop_cycle.pop(key)
-            self._out.append(self._crop_cycle[key])
-            self._crop_sent = now
+        if self._picture_cycle and now - self._picture_sent >= 1.0 / topics.PICTURES.rate_hz:
+            key = next(iter(self._picture_cycle))
+            self._picture_cycle[key] = self._picture_cycle.pop(key)
+            self._out.append(self._picture_cycle[key])
+            self._picture_sent = now
         self._beat(now)
         return self._out
 
@@ -175,7 +175,7 @@ class PerceptionProcess:
         self._out.append(output.points)
         if output.reply is not None:
             self._out.append(output.reply)
-        self._add_new_crops(output.crops)
+        self._add_new_pictures(output.pictures)
         ids = frozenset(point.point_id for point in output.points.points)
         if new := len(ids - self._point_ids):
             self._log(reasons.new_point(len(ids)) if new == 1 else reasons.new_points(new, len(ids)), now)
@@ -188,11 +188,12 @@ class PerceptionProcess:
             for reason in output.rejected_wood:
                 self._log(reason, now)
 
-    def _add_new_crops(self, crops: tuple[PointCrop, ...]) -> None:
-        wanted = {(crop.point_id, crop.revision): crop for crop in crops}
-        new = {key: crop for key, crop in wanted.items() if key not in self._crop_cycle}
+    def _add_new_pictures(self, pictures: tuple[SpurPicture, ...]) -> None:
+        wanted = {(picture.drawing.vine, picture.drawing.spur): picture for picture in pictures}
+        new = {key: picture for key, picture in wanted.items() if self._picture_cycle.get(key) is not picture}
         self._out += new.values()
-        self._crop_cycle = {key: crop for key, crop in self._crop_cycle.items() if key in wanted} | new
+        kept = {key: picture for key, picture in self._picture_cycle.items() if key in wanted and key not in new}
+        self._picture_cycle = kept | new
 
     def _log_refused(self, cause: m.Reason, now: float) -> None:
         # An error that repeats frame after frame is logged once.
@@ -231,4 +232,4 @@ def _work(perception: Perception, job: CameraFrame | Request, send: Callable[[Cl
             send(perception.check_close_up(job))
         points = perception.process(job)
     obstacles = Obstacles(header=points.header, capsules=perception.obstacles)
-    return _Output(points, perception.withdrawn, obstacles, perception.crops, perception.rejected_wood, reply)
+    return _Output(points, perception.withdrawn, obstacles, perception.pictures, perception.rejected_wood, reply)

@@ -25,8 +25,8 @@ from perception.segmentation.segmenter import Segmenter
 from perception.skeleton.topology import perceive_plant
 from perception.tracking.camera_rays import CameraRays, Ray
 from perception.tracking.close_up import check_close_up, failed_check
-from perception.tracking.crop_cache import CropCache
 from perception.tracking.retained_canes import RetainedCanes
+from perception.tracking.spur_pictures import SpurPictures
 from perception.tracking.tracker import Proposal, Tracker, TrackerUpdate
 from rolling_panda import messages as m
 from rolling_panda import reasons
@@ -39,7 +39,7 @@ from rolling_panda.commands import (
     SetRule,
     UndoRule,
 )
-from rolling_panda.messages.perception import Capsule, CloseUpResult, PointCrop
+from rolling_panda.messages.perception import Capsule, CloseUpResult, SpurPicture
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.model.wire_values import vector3
@@ -104,8 +104,9 @@ class Perception:
         self._cane_lines: tuple[tuple[m.Vector3, ...], ...] = ()
         self._obstacle_map = ObstacleMap(config.obstacles)
         self._retained_canes = RetainedCanes(config.obstacles)
-        self._crop_cache = CropCache()
-        self._crops: dict[str, PointCrop] = {}
+        self._spur_pictures = SpurPictures()
+        self.pictures: tuple[SpurPicture, ...] = ()
+        """Pictures of the spurs with a published point, and of the undecided ones."""
         self._undo: list[_RuleSnapshot] = []
         self._severed: list[Array] = []
         """Positions where wood was found cut."""
@@ -169,7 +170,7 @@ class Perception:
         plant = perceive_plant(view, labels, self._config.skeleton)
         numbers = self._numbering.number(plant, view.R[:, 0])
         spurs = self.plant_map.update(plant, numbers)
-        self._crop_cache.add(view, plant, numbers)
+        self._spur_pictures.add(view, plant, numbers)
         fused = {spur.number: spur.as_spur() for spur in self.plant_map.spurs} if self._config.fuse else {}
         keep_out = frame_keep_out(view, labels, self.obstacles, self._config.rule)
         proposals = []
@@ -224,19 +225,23 @@ class Perception:
         if isinstance(request, AddPoint):
             return self._add(Ray(np.array(request.origin), np.array(request.direction)), request.user)
         if isinstance(request, AddPointInImage):
-            ray = self.camera_rays.ray(request.sequence, request.u, request.v, self._model)
+            at = request.sequence, request.u, request.v
+            ray = self._spur_pictures.ray(*at) or self.camera_rays.ray(*at, self._model)
             if ray is None:
                 return _refused(reasons.picture_too_old())
             return self._add(ray, request.user)
         return _refused(reasons.request_unknown(type(request).__name__))
 
     def points(self) -> m.PruningPoints:
-        """All points, undecided sites and canes."""
+        """All points, undecided sites and canes; the pictures are brought up to date."""
+        points = self._tracker.points()
+        sites = [SpurNumber(site.vine, site.spur) for site in self._site_messages if site.vine > 0]
+        self.pictures = self._spur_pictures.update(points, sites, self.plant_map)
         return m.PruningPoints(
             header=m.Header(self._stamp, "odom"),
             segmenter=self.segmenter.name,
             frames=self._frames,
-            points=self._with_distances(self._tracker.points()),
+            points=self._with_distances(points),
             undecided_sites=self._site_messages,
             canes=self._cane_lines,
             rule=_rule_message(self._config.rule),
@@ -252,23 +257,8 @@ class Perception:
         """What of posts, trunks, cordons and wires is not among the obstacles, as it is implausible."""
         return tuple(_REJECTED[why](n, kind) for (kind, why), n in sorted(self._obstacle_map.rejected.items()))
 
-    @property
-    def crops(self) -> tuple[PointCrop, ...]:
-        """Image crops of the published points, in their order; points without an image have none."""
-        return tuple(self._crops.values())
-
     def _with_distances(self, points: tuple[m.PruningPoint, ...]) -> tuple[m.PruningPoint, ...]:
-        """The points with their distances to wires and cordons; crops of new revisions are made."""
-        crops: dict[str, PointCrop] = {}
-        for point in points:
-            old = self._crops.get(point.point_id)
-            if old is not None and old.revision == point.revision:
-                crops[point.point_id] = old
-            elif crop := self._crop_cache.crop(SpurNumber(point.vine, point.spur), np.array(point.position)):
-                crops[point.point_id] = PointCrop(
-                    point_id=point.point_id, revision=point.revision, sequence=crop.sequence, jpeg=crop.jpeg
-                )
-        self._crops = crops
+        """The points with their distances to wires and cordons."""
         positions = np.array([point.position for point in points]).reshape(-1, 3)
         wires, cordons = (
             [None if np.isinf(d) else d for d in CapsuleSet(self.obstacles, (kind,)).nearest(positions).tolist()]
@@ -387,6 +377,9 @@ class Perception:
     def _apply(self, update: TrackerUpdate) -> None:
         self.withdrawn = update.withdrawn
         for position in update.severed:
+            found = self.plant_map.nearest_cane(position)
+            if found is not None:
+                self._spur_pictures.forget(found[0].number)
             self.plant_map.sever(position)
             self._severed.append(position)
 

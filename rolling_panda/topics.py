@@ -172,9 +172,9 @@ POINTS = Topic(
     "perception/points", m.PruningPoints, "perception", "controller, server", 2, "DATA_LOW", "DROP",
     "all current pruning points", latched=True,
 )
-CROPS = Topic(
-    "perception/crops", perception.PointCrop, "perception", "server", 2, "BACKGROUND", "DROP",
-    "picture of a point: at once when new, then one after the other",
+PICTURES = Topic(
+    "perception/pictures", perception.SpurPicture, "perception", "server", 2, "BACKGROUND", "DROP",
+    "picture of a spur with the cuts drawn on it: at once when new, then one after the other",
 )
 CLOSE_UP = Topic(
     "perception/close-up", perception.CloseUpResult, "perception", "controller", 0, "INTERACTIVE_HIGH", "DROP",
@@ -195,7 +195,7 @@ REPLAY = Topic(
 
 TOPICS: tuple[Topic[Any], ...] = (
     MOTION, TOKEN, CUT, CLOSE_UP_REQUEST, STOP, TELEOP, JOINTS, ODOMETRY, BRIDGE, CONTROLLER, PLAN, REPORT, HEARTBEAT,
-    EVENT, CAMERA, PREVIEW, PREVIEW_MOTION, POINTS, CROPS, CLOSE_UP, OBSTACLES, SCENERY, PRESENCE, CONTROL, STOPS,
+    EVENT, CAMERA, PREVIEW, PREVIEW_MOTION, POINTS, PICTURES, CLOSE_UP, OBSTACLES, SCENERY, PRESENCE, CONTROL, STOPS,
     HARDWARE_STOP, REPLAY,
 )
 #: The topic of each type of message.

@@ -13,6 +13,7 @@ from starlette.types import ASGIApp, Scope
 
 from rolling_panda import __version__, reasons
 from rolling_panda.messages.page import PageEvents, PagePoints, PageState
+from rolling_panda.messages.perception import SpurDrawing
 from rolling_panda.messages.supervision import SessionPlan, SessionReport
 from rolling_panda.messages.types import Reason
 from rolling_panda.resources import resource
@@ -41,7 +42,7 @@ _ABOUT = (
 
 
 #: Response types that are no Pydantic models.
-_MESSAGES = (PageState, PagePoints, PageEvents, SessionPlan, SessionReport, Previewed, Control)
+_MESSAGES = (PageState, PagePoints, PageEvents, SessionPlan, SessionReport, Previewed, Control, SpurDrawing)
 
 
 class _Application(FastAPI):

@@ -21,6 +21,7 @@ from rolling_panda.generate.description import (
     union_members,
 )
 from rolling_panda.messages import page as page_messages
+from rolling_panda.messages.perception import SpurDrawing
 from rolling_panda.messages.supervision import SessionReport
 from rolling_panda.reasons import CATALOGUE
 
@@ -54,7 +55,7 @@ def messages_module() -> str:
 def messages_types() -> str:
     """Text of `web/js/link/messages.d.ts`: what the type checker needs."""
     structs = reachable(
-        (*union_members(page_messages.FromServer), *union_members(page_messages.FromPage), SessionReport)
+        (*union_members(page_messages.FromServer), *union_members(page_messages.FromPage), SessionReport, SpurDrawing)
     )
     parts = [_HEADER]
     parts.extend(f"export const {list_name}: readonly {name}[];\n" for name, list_name in CONSTANTS.items())

@@ -1,4 +1,4 @@
-"""Messages of perception: pruning points, close-ups, crops and obstacles."""
+"""Messages of perception: pruning points, pictures of spurs, close-ups and obstacles."""
 
 import hashlib
 from typing import Annotated, Literal
@@ -135,24 +135,72 @@ class PruningPoints(Message, frozen=True, kw_only=True):
     rule: PruningRule | None = None
 
 
-#: Size limit of a crop (bytes).
-CROP_BYTES = 8192
+#: Size limit of a picture (bytes).
+PICTURE_BYTES = 61440
+#: A place in a picture, from its top left corner (px): column, row.
+Pixel = tuple[Finite, Finite]
+#: The same on wood that is cut, with the arc length from the cut (m): negative on the part that stays.
+AxisPixel = tuple[Finite, Finite, Metre]
 
 
-class PointCrop(Message, frozen=True, kw_only=True):
-    """Perception → server: camera image of a point's spur, centred on the cut.
+class DrawnCut(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A cut as it is drawn on a picture.
 
     Attributes:
         point_id: The point.
-        revision: Revision that the image shows.
-        sequence: `sequence` of the camera frame that it was cropped from.
-        jpeg: The image; black outside the frame.
+        revision: Revision that is drawn.
+        position: The cut.
+        axis: Axis of the wood that is cut, from its base outwards. What is beyond the cut falls.
+        nodes: Nodes seen on that wood.
+        falls: Axes of other wood that falls with it: the canes on a stub that is removed.
+        thickness: Diameter of the wood at the cut (px).
     """
 
     point_id: Name
     revision: Count
+    position: Pixel
+    axis: tuple[AxisPixel, ...]
+    nodes: tuple[AxisPixel, ...] = ()
+    falls: tuple[tuple[Pixel, ...], ...] = ()
+    thickness: NonNegative = 0.0
+
+
+class SpurDrawing(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What is drawn on the picture of a spur.
+
+    Attributes:
+        vine: Number of the vine.
+        spur: Number of the spur on that vine.
+        image: Hash of the picture that this is drawn on.
+        sequence: `sequence` of the camera frame that the picture is a part of.
+        frame: Width and height of that frame (px).
+        window: Left, top, width and height of the part (px of the frame). The picture may have fewer pixels.
+        size: Width and height of the picture (px).
+        canes: Axes of the spur's known canes.
+        cuts: The spur's points that the picture shows.
+    """
+
+    vine: Annotated[int, Meta(ge=0, le=100000)]
+    spur: Annotated[int, Meta(ge=0, le=100000)]
+    image: Digest
     sequence: Count
-    jpeg: Annotated[bytes, Meta(max_length=CROP_BYTES)]
+    frame: tuple[Count, Count]
+    window: tuple[Count, Count, Count, Count]
+    size: tuple[Count, Count]
+    canes: tuple[tuple[Pixel, ...], ...] = ()
+    cuts: tuple[DrawnCut, ...] = ()
+
+
+class SpurPicture(Message, frozen=True, kw_only=True):
+    """Perception → server: camera image of a spur with a point, or of an undecided one.
+
+    Attributes:
+        drawing: What is drawn on it.
+        jpeg: The image.
+    """
+
+    drawing: SpurDrawing
+    jpeg: Annotated[bytes, Meta(max_length=PICTURE_BYTES)]
 
 
 #: `seen`: the cane stands and matches; `changed`: it stands but differs from the accepted one; `severed`: the wood

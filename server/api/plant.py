@@ -1,18 +1,18 @@
-"""REST for requests to perception about the pruning rule, and for crops of points."""
+"""REST for requests to perception about the pruning rule, and pictures of spurs."""
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends, Query, Response
+from fastapi import APIRouter, Depends, Path, Query, Response
 from fastapi.responses import JSONResponse
 
 from rolling_panda import commands as ask
 from rolling_panda import reasons
 from rolling_panda.messages.page import PagePoints
-from rolling_panda.messages.perception import PruningRule
+from rolling_panda.messages.perception import PruningRule, SpurDrawing, SpurPicture
 from rolling_panda.messages.types import RuleEffect
 from server.api import bodies as body
 from server.api.dependencies import Caller, Operator, PointId, fields_of
-from server.api.responses import COMMAND, INVALID, NOT_FOUND, answer, outcome, query
+from server.api.responses import COMMAND, INVALID, NOT_FOUND, Responses, answer, message, outcome, query
 from server.robots.context import RobotContext
 from server.robots.link import Result
 
@@ -23,6 +23,12 @@ def _rule(fields: Annotated[dict[str, Any], Depends(fields_of(PruningRule))]) ->
 
 #: The pruning rule that a request's body describes.
 RuleBody = Annotated[PruningRule, Depends(_rule)]
+#: Number of a vine or a spur.
+Number = Annotated[int, Path(ge=0, le=100000)]
+#: Hash of a picture.
+Image = Annotated[str | None, Query(max_length=64)]
+_NOT_YET: Responses = {204: {"description": "No picture has come yet: ask again."}}
+_PICTURE = query("image/jpeg", _NOT_YET, NOT_FOUND, INVALID)
 
 
 def plant_router(robot: RobotContext) -> APIRouter:
@@ -60,28 +66,48 @@ def plant_router(robot: RobotContext) -> APIRouter:
             return answer(Result(restored.status, reasons.acceptances_not_restored(cause)))
         return answer(done)
 
-    @router.get(
-        "/points/{point_id}/crop",
-        response_class=Response,
-        responses=query(
-            "image/jpeg", {204: {"description": "No picture has come yet: ask again."}}, NOT_FOUND, INVALID
-        ),
-    )
-    async def crop(session: Caller, point_id: PointId, revision: Annotated[int, Query(ge=0)] | None = None) -> Response:
-        """The camera image around a point, the cut in the middle, as JPEG; of one revision where that is given.
+    @router.get("/points/{point_id}/drawing", responses=query(SpurDrawing, _NOT_YET, NOT_FOUND))
+    async def point_drawing(session: Caller, point_id: PointId) -> Response:
+        """Where the cut of a point and the wood around it are in its picture. 204 while there is none: ask again."""
+        return _drawing(robot.link.pictures.of_point(point_id)) or _no_picture(point_id)
 
-        204 while no image of a known point has come: ask again.
+    @router.get("/points/{point_id}/picture", response_class=Response, responses=_PICTURE)
+    async def point_picture(session: Caller, point_id: PointId, image: Image = None) -> Response:
+        """The camera image of a point's spur, as JPEG; with `image` the one that a drawing is of.
+
+        204 while it has not come: ask again.
         """
-        found = robot.link.crops.get(point_id)
-        if found is None or revision not in (None, found.revision):
-            known = robot.pages.points.points if robot.pages.points is not None else ()
-            if any(row.point.point_id == point_id for row in known):
-                # Not an error, which a browser's console would show.
-                return Response(status_code=204)
-            return answer(Result(404, reasons.point_unknown(point_id)))
-        return Response(found.jpeg, media_type="image/jpeg")
+        return _jpeg(robot.link.pictures.of_point(point_id), image) or _no_picture(point_id)
+
+    @router.get("/spurs/{vine}/{spur}/drawing", responses=query(SpurDrawing, _NOT_YET, INVALID))
+    async def spur_drawing(session: Caller, vine: Number, spur: Number) -> Response:
+        """The same of a spur, as of an undecided one."""
+        return _drawing(robot.link.pictures.of_spur(vine, spur)) or Response(status_code=204)
+
+    @router.get("/spurs/{vine}/{spur}/picture", response_class=Response, responses=_PICTURE)
+    async def spur_picture(session: Caller, vine: Number, spur: Number, image: Image = None) -> Response:
+        """The camera image of a spur, as JPEG; with `image` the one that a drawing is of. 204 while there is none."""
+        return _jpeg(robot.link.pictures.of_spur(vine, spur), image) or Response(status_code=204)
+
+    def _no_picture(point_id: str) -> Response:
+        known = robot.pages.points.points if robot.pages.points is not None else ()
+        if any(row.point.point_id == point_id for row in known):
+            # Not an error, which a browser's console would show.
+            return Response(status_code=204)
+        return answer(Result(404, reasons.point_unknown(point_id)))
 
     return router
+
+
+def _drawing(picture: SpurPicture | None) -> Response | None:
+    return None if picture is None else message(picture.drawing)
+
+
+def _jpeg(picture: SpurPicture | None, image: str | None) -> Response | None:
+    if picture is None or image not in (None, picture.drawing.image):
+        return None
+    cache = "no-store" if image is None else "private, max-age=3600, immutable"
+    return Response(picture.jpeg, media_type="image/jpeg", headers={"Cache-Control": cache})
 
 
 def rule_outcome(effect: RuleEffect, points: PagePoints | None) -> dict[str, Any]:

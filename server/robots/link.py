@@ -21,7 +21,6 @@ from rolling_panda import reasons, topics
 from rolling_panda.commands import EvaluateRule, PlantRequest
 from rolling_panda.errors import ServiceError
 from rolling_panda.messages.page import ProcessPresence
-from rolling_panda.messages.perception import PointCrop
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.messages.supervision import Presence, StopState, TeleopTarget
 from rolling_panda.reasons import said
@@ -29,13 +28,12 @@ from rolling_panda.transport.inbox import Received
 from rolling_panda.transport.zenoh import Transport
 from server.auth.sessions import Session
 from server.robots.event_log import RobotLog
+from server.robots.pictures import PictureStore
 
 _STOP_REPEATS = 5
 _STOP_SPACING_S = 0.025
 #: Camera images that are kept: a page asks for the frame of its state, and newer ones may have come since.
 _MAX_IMAGES = 5
-#: Crops of points that are kept, of at most 8 kB each.
-_MAX_CROPS = 3000
 
 
 @dataclass(frozen=True)
@@ -69,9 +67,8 @@ class RobotLink:
         self.report = transport.slot(topics.REPORT)
         self.scenery = transport.slot(topics.SCENERY)
         self.obstacles = transport.slot(topics.OBSTACLES)
-        self.crops: dict[str, PointCrop] = {}
-        """The newest crop of each point, by id."""
-        transport.subscribe(topics.CROPS, self._on_crop)
+        self.pictures = PictureStore()
+        transport.subscribe(topics.PICTURES, lambda picture, at: self.pictures.add(picture))
         self.control = transport.slot(topics.CONTROL)
         self.stops: dict[str, Received[StopState]] = {}
         transport.subscribe(topics.STOPS, self._on_stops)
@@ -170,13 +167,6 @@ class RobotLink:
         self.images[message.sequence] = message.color_jpeg
         if len(self.images) > _MAX_IMAGES:
             del self.images[next(iter(self.images))]
-
-    def _on_crop(self, message: PointCrop, at: float) -> None:
-        # The newest goes last, so that the oldest crops are dropped first.
-        self.crops.pop(message.point_id, None)
-        self.crops[message.point_id] = message
-        if len(self.crops) > _MAX_CROPS:
-            del self.crops[next(iter(self.crops))]
 
     def _on_stops(self, message: StopState, at: float) -> None:
         self.stops[message.process] = Received(message, at)

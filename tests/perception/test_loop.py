@@ -11,10 +11,10 @@ from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.commands import SetRule
 from rolling_panda.errors import RollingPandaError
-from rolling_panda.messages.perception import Capsule, CloseUpResult, PointCrop
+from rolling_panda.messages.perception import Capsule, CloseUpResult, SpurDrawing, SpurPicture
 from rolling_panda.messages.robot import CameraFrame, Intrinsics
 from rolling_panda.reasons import severity_of
-from rolling_panda.topics import CAMERA, CLOSE_UP, CROPS, EVENT, HEARTBEAT, OBSTACLES, PLANT, POINTS
+from rolling_panda.topics import CAMERA, CLOSE_UP, EVENT, HEARTBEAT, OBSTACLES, PICTURES, PLANT, POINTS
 from rolling_panda.transport.runner import Runner
 from tests.support.fake_wire import FakeWire
 from tests.support.points import point
@@ -51,7 +51,7 @@ class FakePerception:
     """Perception that does what its frames say."""
 
     withdrawn = ()
-    crops = ()
+    pictures = ()
     rejected_wood = ()
     familiarity_unknown = False
     obstacles = (Capsule("wire", (0.0, 0.75, 1.2), (2.0, 0.75, 1.2), 0.004, 0.004),)
@@ -258,23 +258,32 @@ def test_a_request_that_waits_too_long_is_not_done_later(parts, monkeypatch):
     assert done == []
 
 
+def picture(spur, sequence=1):
+    drawing = SpurDrawing(
+        vine=1, spur=spur, image="ab", sequence=sequence, frame=(848, 480), window=(0, 0, 240, 180), size=(240, 180)
+    )
+    return SpurPicture(drawing=drawing, jpeg=b"x")
+
+
 def test_a_picture_is_sent_when_it_is_new_and_again_now_and_then(parts):
     wire, perception, loop = parts
-    sent = wire.sent[CROPS.name]
-    perception.crops = tuple(PointCrop(point_id=name, revision=1, sequence=1, jpeg=b"x") for name in ("p1", "p2"))
+    sent = wire.sent[PICTURES.name]
+    first, second = picture(1), picture(2)
+    perception.pictures = (first, second)
     loop.see("frame", 0.0)
     turns(loop, lambda: len(sent) >= 2)
     for tick in range(21):
         loop.step(tick / 20.0)
-    assert [crop.point_id for crop in sent[:2]] == ["p1", "p2"]
-    assert {crop.point_id for crop in sent[2:]} == {"p1", "p2"} and len(sent) <= 6
-    perception.crops = (PointCrop(point_id="p2", revision=2, sequence=5, jpeg=b"y"),)
+    assert sent[:2] == [first, second]
+    assert {each.drawing.spur for each in sent[2:]} == {1, 2} and len(sent) <= 6
+    newer = picture(2, sequence=5)
+    perception.pictures = (newer,)
     before = len(sent)
     loop.see("frame", 2.0)
     turns(loop, lambda: len(sent) > before, start=1.05)
     for tick in range(21):
         loop.step(2.0 + tick / 20.0)
-    assert {(crop.point_id, crop.revision) for crop in sent[before:]} == {("p2", 2)}
+    assert all(each == newer for each in sent[before:])
 
 
 def test_a_frame_that_is_never_worked_on_can_be_clicked_all_the_same(parts):

@@ -19,10 +19,11 @@ from perception.pipeline import Perception, with_width_bias
 from perception.segmentation.frame import CORDON, POST, CorruptFrameError, decode_frame
 from perception.segmentation.segmenter import LabelImageSegmenter, choose_segmenter
 from perception.skeleton.topology import perceive_plant
+from perception.tracking.camera_rays import CameraRays
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.commands import AddPoint, AddPointInImage, EvaluateRule, MovePoint, SetRule, UndoRule
-from rolling_panda.messages.perception import point_digest
+from rolling_panda.messages.perception import SpurPicture, point_digest
 from rolling_panda.messages.types import WOOD_CLASSES
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.transport.codec import StrictDecoder, encode
@@ -289,17 +290,47 @@ def test_a_point_says_how_sure_it_is_and_what_is_near(model, frames):
     assert seen.points().rule == m.PruningRule()
 
 
-def test_every_point_has_a_picture_that_is_renewed_with_its_revision(model, frames):
+def test_every_point_has_a_picture_that_is_drawn_anew_with_its_revision(model, frames):
     seen, points = shown(model, frames)
-    crops = {crop.point_id: crop for crop in seen.crops}
-    assert crops.keys() == {point.point_id for point in points}
-    assert {crop.sequence for crop in crops.values()} <= {frame.sequence for frame in frames}
+    for frame in frames:
+        seen.process(frame)
+    cuts = {cut.point_id: cut for picture in seen.pictures for cut in picture.drawing.cuts}
+    assert cuts.keys() == {point.point_id for point in seen.points().points} >= {point.point_id for point in points}
+    assert {picture.drawing.sequence for picture in seen.pictures} <= {frame.sequence for frame in frames}
+    spurs = {(picture.drawing.vine, picture.drawing.spur) for picture in seen.pictures}
+    assert spurs >= {(site.vine, site.spur) for site in seen.points().undecided_sites if site.vine}
     seen.answer(SetRule(user="Ada", rule=m.PruningRule(offset=0.03)))
     now = {point.point_id: point for point in seen.points().points}
-    again = {crop.point_id: crop for crop in seen.crops}
-    moved = [name for name in crops if name in now and now[name].revision > crops[name].revision]
+    again = {cut.point_id: cut for picture in seen.pictures for cut in picture.drawing.cuts}
+    moved = [name for name in cuts if name in now and now[name].revision > cuts[name].revision]
     assert moved and all(again[name].revision == now[name].revision for name in moved)
-    assert all(again[name].jpeg != crops[name].jpeg for name in moved)
+    assert all(again[name].position != cuts[name].position for name in moved)
+    for picture in seen.pictures:
+        assert StrictDecoder(SpurPicture).decode(encode(picture)) == picture
+
+
+def test_a_tap_on_a_picture_places_a_point_on_the_cane_under_it(model, frames):
+    seen, _ = shown(model, frames)
+    picture = next(each for each in seen.pictures if each.drawing.canes and not each.drawing.cuts)
+    drawing = picture.drawing
+    # Long after: the frames of the last minutes are other ones.
+    seen.camera_rays = CameraRays()
+    left, top, width, height = drawing.window
+    for cane in drawing.canes:
+        for x, y in cane:
+            scale = drawing.size[0] / width
+            if not (0 < x < drawing.size[0] and 0 < y < drawing.size[1]):
+                continue
+            u, v = (left + x / scale) / drawing.frame[0], (top + y / scale) / drawing.frame[1]
+            answer = seen.answer(AddPointInImage(user="Ada", sequence=drawing.sequence, u=u, v=v))
+            if answer.ok:
+                break
+        else:
+            continue
+        break
+    assert answer.ok and answer.reason.code == "point_placed"
+    by_hand = [point for point in seen.points().points if point.kind == "by hand"]
+    assert [(point.vine, point.spur) for point in by_hand] == [(drawing.vine, drawing.spur)]
 
 
 def test_another_rule_keeps_the_names_of_the_spurs_cuts(model, frames):

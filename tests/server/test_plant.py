@@ -14,9 +14,10 @@ from rolling_panda.commands import (
     UndoRule,
 )
 from rolling_panda.errors import ServiceError
-from rolling_panda.messages.perception import PointCrop
+from rolling_panda.messages.perception import DrawnCut, SpurDrawing, SpurPicture
 from rolling_panda.reasons import said, text_of
 from server.api.responses import outcome
+from server.robots.pictures import PictureStore
 from tests.support.fake_wire import FakeWire, controller_state, pruning_point, pruning_points
 from tests.support.running_server import eventually, running_server
 
@@ -166,17 +167,46 @@ def test_a_rule_is_taken_back_by_perception_first_and_then_its_acceptances_by_th
         assert answer.json()["values"]["cause"]["values"] == {"text": "it began since"}
 
 
-def test_the_picture_of_a_point_is_given_for_its_revision(server):
+def spur_picture(jpeg: bytes, image: str, *cuts: str, spur: int = 3) -> SpurPicture:
+    drawn = tuple(DrawnCut(point_id=name, revision=3, position=(9.0, 8.0), axis=((9.0, 8.0, 0.0),)) for name in cuts)
+    drawing = SpurDrawing(
+        vine=1, spur=spur, image=image, sequence=7, frame=(848, 480), window=(0, 0, 240, 180), size=(240, 180),
+        cuts=drawn,
+    )  # fmt: skip
+    return SpurPicture(drawing=drawing, jpeg=jpeg)
+
+
+def test_a_point_and_a_spur_have_a_picture_and_what_is_drawn_on_it(server):
     with server.client(role="viewer", user="bob") as client:
-        unknown = client.get("/api/points/p1/crop")
-        assert (unknown.status_code, unknown.json()["code"]) == (404, "point_unknown")
+        for what in ("picture", "drawing"):
+            unknown = client.get(f"/api/points/p1/{what}")
+            assert (unknown.status_code, unknown.json()["code"]) == (404, "point_unknown")
+            assert client.get(f"/api/spurs/1/3/{what}").status_code == 204
         server.wire.deliver(topics.POINTS, pruning_points(pruning_point("p1")))
-        eventually(lambda: client.get("/api/points/p1/crop").status_code == 204)
-        server.wire.deliver(topics.CROPS, PointCrop(point_id="p1", revision=3, sequence=7, jpeg=b"picture"))
-        answer = client.get("/api/points/p1/crop?revision=3")
+        eventually(lambda: client.get("/api/points/p1/drawing").status_code == 204)
+        server.wire.deliver(topics.PICTURES, spur_picture(b"picture", "aa", "p1"))
+        drawing = client.get("/api/points/p1/drawing").json()
+        assert drawing["image"] == "aa" and drawing["cuts"][0]["position"] == [9.0, 8.0]
+        answer = client.get("/api/points/p1/picture?image=aa")
         assert (answer.content, answer.headers["content-type"]) == (b"picture", "image/jpeg")
-        assert client.get("/api/points/p1/crop?revision=4").status_code == 204
-        server.wire.deliver(topics.CROPS, PointCrop(point_id="p1", revision=4, sequence=9, jpeg=b"newer"))
-        assert client.get("/api/points/p1/crop").content == b"newer"
+        assert "immutable" in answer.headers["cache-control"]
+        assert client.get("/api/points/p1/picture?image=bb").status_code == 204, "not another picture under a drawing"
+        assert client.get("/api/spurs/1/3/picture").content == b"picture"
+        # The point was cut: its last picture stays, and the spur has a new one.
+        server.wire.deliver(topics.PICTURES, spur_picture(b"newer", "bb"))
+        assert client.get("/api/points/p1/picture").content == b"picture"
+        assert client.get("/api/spurs/1/3/picture").content == b"newer"
+        assert client.get("/api/spurs/1/3/drawing").json()["cuts"] == []
+        assert client.get("/api/spurs/1/-3/drawing").status_code == 422
     with server.visitor() as stranger:
-        assert stranger.get("/api/points/p1/crop").status_code == 401
+        assert stranger.get("/api/points/p1/picture").status_code == 401
+        assert stranger.get("/api/spurs/1/3/drawing").status_code == 401
+
+
+def test_the_oldest_pictures_are_dropped(monkeypatch):
+    monkeypatch.setattr("server.robots.pictures._MAX_PICTURES", 3)
+    store = PictureStore()
+    for number in (1, 2, 3, 1, 4):
+        store.add(spur_picture(b"%d" % number, "aa", f"p{number}", spur=number))
+    kept = [number for number in range(1, 5) if store.of_point(f"p{number}")]
+    assert kept == [1, 3, 4] == [number for number in range(1, 5) if store.of_spur(1, number)]

@@ -174,7 +174,7 @@ class PlayedServer:
             return Response(STILL if self.view else self.frame, media_type="text/html")
         if path == "/viser/still.jpg":
             return Response(self.view, media_type="image/jpeg")
-        if path.startswith("/api/points/") and path.endswith("/crop"):
+        if path.startswith("/api/points/") and path.endswith("/picture"):
             self.crops_fetched.append(request.target)
             return Response(self.crop, media_type="image/jpeg") if self.crop else Response(status_code=204)
         if path == "/camera/color.jpg":

@@ -17,7 +17,7 @@ def test_the_chosen_point_shows_its_picture_and_what_is_behind_the_cut(page: Pag
     page.locator('[data-point-id="p1"]').click()
     details = page.locator('[data-point-id="p1"] rp-point-details')
     expect(details.locator(".crop")).to_have_class("crop loaded")
-    assert server.crops_fetched[-1].startswith("/api/points/p1/crop?revision=4")
+    assert server.crops_fetched[-1].startswith("/api/points/p1/picture?of=00000001")
     for words in (
         "Spur cut, 20 mm past node 2",
         "8.0 mm, ≈ 470 N",
@@ -46,7 +46,7 @@ def test_a_picture_is_fetched_once_a_revision_and_again_until_it_has_come(page: 
     first = msgspec.structs.replace(server.points[0].point, revision=5, digest="ab" * 16)
     server.points = (msgspec.structs.replace(server.points[0], point=first), *server.points[1:])
     server.tell(server.page_points())
-    until(page, lambda: server.crops_fetched[-1].startswith("/api/points/p1/crop?revision=5"))
+    until(page, lambda: server.crops_fetched[-1].startswith("/api/points/p1/picture?of=abab"))
 
 
 ASKED = {"system": "spur", "nodes_kept": 2, "fruiting_nodes": 8, "preferred_diameter": 0.006, "offset": 0.025}

@@ -168,7 +168,7 @@ export class RpPointDetails extends HTMLElement {
       if (node) setText(node, value(point));
     });
     // A restarted perception reuses ids: the hash distinguishes the points.
-    const path = `api/points/${encodeURIComponent(point.point_id)}/crop?revision=${point.revision}&of=${point.digest}`;
+    const path = `api/points/${encodeURIComponent(point.point_id)}/picture?of=${point.digest}`;
     if (path === this.shown) return;
     this.shown = path;
     this.tries = 0;

@@ -27,6 +27,10 @@ export type Vector3 = [number, number, number];
 
 export type WoodClass = "background"|"ground"|"post"|"trunk"|"cordon"|"spur"|"cane"|"node"|"wire"|"hose"|"old cut";
 
+export type Pixel = [number, number];
+
+export type AxisPixel = [number, number, number];
+
 export type Finding = "seen"|"changed"|"severed"|"unseen";
 
 export type Actuated = [number, number, number, number, number, number, number, number, number];
@@ -793,6 +797,46 @@ export interface SessionReport {
   refusal_count: number;
   /** The newest changes of control. */
   control: ControlReport[];
+}
+
+/** A cut as it is drawn on a picture. */
+export interface DrawnCut {
+  /** The point. */
+  point_id: string;
+  /** Revision that is drawn. */
+  revision: number;
+  /** The cut. */
+  position: Pixel;
+  /** Axis of the wood that is cut, from its base outwards. What is beyond the cut falls. */
+  axis: AxisPixel[];
+  /** Nodes seen on that wood. */
+  nodes: AxisPixel[];
+  /** Axes of other wood that falls with it: the canes on a stub that is removed. */
+  falls: Pixel[][];
+  /** Diameter of the wood at the cut (px). */
+  thickness: number;
+}
+
+/** What is drawn on the picture of a spur. */
+export interface SpurDrawing {
+  /** Number of the vine. */
+  vine: number;
+  /** Number of the spur on that vine. */
+  spur: number;
+  /** Hash of the picture that this is drawn on. */
+  image: string;
+  /** `sequence` of the camera frame that the picture is a part of. */
+  sequence: number;
+  /** Width and height of that frame (px). */
+  frame: [number, number];
+  /** Left, top, width and height of the part (px of the frame). The picture may have fewer pixels. */
+  window: [number, number, number, number];
+  /** Width and height of the picture (px). */
+  size: [number, number];
+  /** Axes of the spur's known canes. */
+  canes: Pixel[][];
+  /** The spur's points that the picture shows. */
+  cuts: DrawnCut[];
 }
 
 export type FromServer = PageState|PagePoints|PagePreview|PageEvents|Selected|PickRay|Measured|HoldEnded|Pong;
