@@ -161,7 +161,7 @@ class ControllerProcess:
             self._stops_told = None
         if now >= self._report_due:
             self._report_due = now + 1.0 / REPORT.rate_hz
-            out.append(self._ledger.report)
+            out += (self._ledger.report, self._ledger.timeline)
         if waits:
             for message in out:
                 if isinstance(message, m.LogEvent):

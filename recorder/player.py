@@ -8,8 +8,8 @@ from recorder.recording import RecordedMessage, Recording
 from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.commands import SeekReplay
-from rolling_panda.messages import supervision as control_messages
-from rolling_panda.messages.supervision import ReplayState
+from rolling_panda.messages.supervision import ReplayState, StopState, Timeline
+from rolling_panda.timeline import TimelineBuilder
 from rolling_panda.topics import Topic
 
 #: State of the robot; commands and requests are not played.
@@ -18,6 +18,7 @@ _PLAYED = {
     for topic in (
         topics.JOINTS, topics.ODOMETRY, topics.BRIDGE, topics.CONTROLLER, topics.CONTROL, topics.STOPS, topics.PLAN,
         topics.HEARTBEAT, topics.EVENT, topics.CAMERA, topics.POINTS, topics.PICTURES, topics.OBSTACLES, topics.SCENERY,
+        topics.REPORT, topics.PROGRAM,
     )
 }  # fmt: skip
 #: While paused, messages of topics at least this fast (Hz) are repeated with this period (s), so that they do not get
@@ -29,7 +30,7 @@ class Player:
     """Playback position in a recording. It has no clock: `now` (s) is the caller's."""
 
     def __init__(self, recording: Recording, name: str, now: float) -> None:
-        """Start playing at the beginning.
+        """Start playing at the beginning, at its own speed.
 
         Args:
             recording: The recording.
@@ -47,7 +48,9 @@ class Player:
         self._position, self._now, self._repeated = 0.0, now, float("-inf")
         self._next = 0
         self._sought = False
-        self._playing = True
+        self._playing, self._speed = True, 1.0
+        #: Of the whole recording.
+        self.timeline = _timeline(recording)
 
     @property
     def state(self) -> ReplayState:
@@ -58,11 +61,13 @@ class Player:
             duration_s=self._recording.duration_s,
             position_s=self._position,
             playing=self._playing,
+            speed=self._speed,
+            complete=self._recording.complete,
         )
 
     def seek(self, request: SeekReplay) -> None:
-        """Set the position, pause or continue."""
-        self._playing = request.playing
+        """Set position and speed, pause or continue."""
+        self._playing, self._speed = request.playing, request.speed or self._speed
         if request.position_s is not None:
             self._position = min(request.position_s, self._recording.duration_s)
             self._next = bisect.bisect_right(self._times, self._position)
@@ -77,7 +82,7 @@ class Player:
             self._repeated = now
             due = self._newest(0.0)
         if self._playing:
-            self._position = min(self._position + elapsed, self._recording.duration_s)
+            self._position = min(self._position + self._speed * elapsed, self._recording.duration_s)
             end = bisect.bisect_right(self._times, self._position)
             due += self._messages[self._next : end]
             self._next = end
@@ -96,11 +101,21 @@ class Player:
 
 def _process(recorded: RecordedMessage) -> str:
     """The sender, on topics with several senders; else empty."""
-    if recorded.topic is topics.HEARTBEAT or recorded.topic is topics.STOPS:
+    if recorded.topic in (topics.HEARTBEAT, topics.STOPS, topics.PROGRAM):
         message = recorded.message()
-        if isinstance(message, m.Heartbeat | control_messages.StopState):
+        if isinstance(message, m.Heartbeat | StopState | m.Program):
             return str(message.process)
     return ""
+
+
+def _timeline(recording: Recording) -> Timeline:
+    builder = TimelineBuilder()
+    for each in recording.messages:
+        if each.topic is topics.EVENT:
+            line = each.message()
+            assert isinstance(line, m.LogEvent)
+            builder.add(each.at, line)
+    return builder.timeline(recording.begins_at, recording.begins_at + recording.duration_s)
 
 
 def is_played(topic: Topic[Any]) -> bool:

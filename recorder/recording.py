@@ -5,7 +5,7 @@ import json
 import struct
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 from mcap.exceptions import McapError
@@ -19,6 +19,7 @@ from rolling_panda import messages as m
 from rolling_panda.errors import InputError
 from rolling_panda.topics import TOPICS, Topic
 
+T = TypeVar("T")
 _ENCODER = msgspec.json.Encoder()
 #: Largest size of a chunk (bytes); `flush` ends one earlier.
 _CHUNK_SIZE = 256 * 1024
@@ -108,11 +109,19 @@ class RecordedMessage:
         Raises:
             InputError: It does not fit this version's type.
         """
+        message: m.Message = self.decoded(self.topic.message)
+        return message
+
+    def decoded(self, kind: type[T]) -> T:
+        """Decode the message as a type that may have some of its fields only.
+
+        Raises:
+            InputError: It does not fit that type.
+        """
         try:
-            decoded: m.Message = msgspec.json.decode(self.data, type=self.topic.message)
+            return msgspec.json.decode(self.data, type=kind)
         except msgspec.ValidationError as error:
             raise InputError(f"the recording holds a {self.topic.name} of another version: {error}") from error
-        return decoded
 
 
 @dataclass(frozen=True)

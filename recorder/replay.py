@@ -13,6 +13,7 @@ from typing import Any
 
 from msgspec.structs import replace
 
+from recorder.cut_pictures import keep_pictures
 from recorder.player import Player, is_played
 from recorder.recording import read_recording
 from rolling_panda import messages as m
@@ -62,6 +63,7 @@ def _run(arguments: argparse.Namespace, stopping: threading.Event) -> int:
         wire = TransportConfig(connect=(endpoint,), certificates=certificates)
         router = replace(wire, mode="router", connect=(), listen=(endpoint,))
         stack.callback(Router(router).close)
+        keep_pictures(recording, folder / "pictures" / ROBOT_ID)
         replay = stack.enter_context(Replay(wire, Player(recording, arguments.file.name, time.monotonic())))
         children = ChildProcesses(folder)
         stack.callback(children.end)
@@ -94,11 +96,11 @@ class Replay(Closing):
                 wires = [wire for process, wire in self._wires.items() if process == topic.sender]
                 self._publishers[topic.name] = (wires or [self._wires["bridge"]])[0].publisher(topic)
         controller = self._wires["controller"]
-        self._state = controller.publisher(topics.REPLAY)
+        self._state, self._timeline = controller.publisher(topics.REPLAY), controller.publisher(topics.TIMELINE)
         controller.serve(topics.SEEK, self._seek)
         controller.serve(topics.INTENT, lambda request: _REFUSED)
         self._wires["perception"].serve(topics.PLANT, lambda request: _REFUSED)
-        self._state_sent = float("-inf")
+        self._state_sent = self._timeline_sent = float("-inf")
 
     def close(self) -> None:
         """Close the connections."""
@@ -114,6 +116,9 @@ class Replay(Closing):
         if now - self._state_sent >= _STATE_PERIOD_S:
             self._state_sent = now
             self._state.put(state)
+        if now - self._timeline_sent >= 1.0 / topics.TIMELINE.rate_hz:
+            self._timeline_sent = now
+            self._timeline.put(self._player.timeline)
 
     def _seek(self, request: SeekReplay) -> m.Answer:
         with self._lock:

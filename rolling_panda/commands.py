@@ -14,7 +14,7 @@ from msgspec import Meta, Struct
 
 from rolling_panda import reasons
 from rolling_panda.messages.perception import PruningRule
-from rolling_panda.messages.supervision import NEVER_SEEN_S
+from rolling_panda.messages.supervision import NEVER_SEEN_S, ReplaySpeed
 from rolling_panda.messages.types import (
     Count,
     Digest,
@@ -35,15 +35,17 @@ from rolling_panda.mode_table import Event
 
 
 class SeekReplay(Message, frozen=True, kw_only=True):
-    """Server → replay: jump, play or pause.
+    """Server → replay: jump, play or pause, or set the speed.
 
     Attributes:
         position_s: New position from the beginning (s); None keeps the position.
         playing: Whether to play or pause there.
+        speed: Seconds of the recording a second; None keeps the speed.
     """
 
     position_s: NonNegative | None = None
     playing: bool = True
+    speed: ReplaySpeed | None = None
 
 
 class PlantRequest(Struct, frozen=True, kw_only=True, tag=True, forbid_unknown_fields=True):

@@ -1095,6 +1095,16 @@ def no_camera_image() -> None:
     """No camera image has come yet."""
 
 
+@_reason("warning", "the cut itself is recorded; make room on the disk, or give the server another folder with --state")
+def cut_picture_lost(error: str) -> None:
+    """A picture of a cut could not be kept: {error}."""
+
+
+@_reason("warning", "the report leaves it out")
+def cut_picture_damaged(cut: str, moment: str, error: str) -> None:
+    """The picture {moment} cut {cut} cannot be read: {error}."""
+
+
 @_reason("warning", "ask for a newer one")
 def camera_frame_gone(frame: float, newest: float) -> None:
     """Frame {frame:.0f} is not among the newest ones; {newest:.0f} is."""

@@ -156,6 +156,14 @@ REPORT = Topic(
     "controller/report", supervision.SessionReport, "controller", "server", 0.2, "BACKGROUND", "DROP",
     "cuts, refusals and changes of control since the controller started", latched=True,
 )
+TIMELINE = Topic(
+    "controller/timeline", supervision.Timeline, "controller", "server", 0.2, "BACKGROUND", "DROP",
+    "changes of mode, cuts and refusals since the controller started, or of a whole recording", latched=True,
+)
+PROGRAM = Topic(
+    "program", m.Program, "any", "server", 0.2, "BACKGROUND", "DROP",
+    "version and start of a process", latched=True,
+)
 HEARTBEAT = Topic(
     "heartbeat", m.Heartbeat, "any", "controller, server, onlooker", 20, "INTERACTIVE_HIGH", "DROP",
     "the loop of a process runs", queue=64,
@@ -194,9 +202,9 @@ REPLAY = Topic(
 )
 
 TOPICS: tuple[Topic[Any], ...] = (
-    MOTION, TOKEN, CUT, CLOSE_UP_REQUEST, STOP, TELEOP, JOINTS, ODOMETRY, BRIDGE, CONTROLLER, PLAN, REPORT, HEARTBEAT,
-    EVENT, CAMERA, PREVIEW, PREVIEW_MOTION, POINTS, PICTURES, CLOSE_UP, OBSTACLES, SCENERY, PRESENCE, CONTROL, STOPS,
-    HARDWARE_STOP, REPLAY,
+    MOTION, TOKEN, CUT, CLOSE_UP_REQUEST, STOP, TELEOP, JOINTS, ODOMETRY, BRIDGE, CONTROLLER, PLAN, REPORT, TIMELINE,
+    PROGRAM, HEARTBEAT, EVENT, CAMERA, PREVIEW, PREVIEW_MOTION, POINTS, PICTURES, CLOSE_UP, OBSTACLES, SCENERY, PRESENCE,
+    CONTROL, STOPS, HARDWARE_STOP, REPLAY,
 )
 #: The topic of each type of message.
 TOPIC_OF: dict[type[Any], Topic[Any]] = {topic.message: topic for topic in TOPICS}
@@ -218,7 +226,7 @@ PLANT: Service[commands.PlantRequest] = Service(
     "perception", 2.0, "set, evaluate or undo a pruning rule; add or move a point by hand",
 )
 SEEK: Service[commands.SeekReplay] = Service(
-    "service/seek", (commands.SeekReplay,), "controller", 1.0, "jump in, play or pause the recording",
+    "service/seek", (commands.SeekReplay,), "controller", 1.0, "jump in, play or pause the recording, or set its speed",
 )
 SERVICES: tuple[Service[Any], ...] = (INTENT, RELEASE, PLANT, SEEK)
 # fmt: on

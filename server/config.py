@@ -24,6 +24,7 @@ class ServerConfig(Struct, frozen=True, forbid_unknown_fields=True):
         session_idle_s: A session unused for this long ends.
         invite_s: Lifetime of a sign-in link that a supervisor makes.
         log_lines: Log lines in memory.
+        cut_pictures: Pictures of cuts on disk, two a cut; the oldest give way.
         head_s: Time limit for a TLS handshake, for the first byte of a request, and from it to the end of the head.
         body_s: Time limit for a request's body after its head.
         connections: Limit of open connections; a new one replaces the longest idle one.
@@ -48,6 +49,7 @@ class ServerConfig(Struct, frozen=True, forbid_unknown_fields=True):
     session_idle_s: Annotated[float, at_most(86400.0)] = 12 * 3600.0
     invite_s: Annotated[float, at_most(3600.0)] = 600.0
     log_lines: Annotated[int, Meta(ge=200, le=100_000)] = 1000
+    cut_pictures: Annotated[int, Meta(ge=2, le=100_000)] = 2000
     head_s: Annotated[float, at_most(10.0)] = 5.0
     body_s: Annotated[float, at_most(30.0)] = 10.0
     connections: Annotated[int, at_most(2048, 16)] = 512

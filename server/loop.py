@@ -17,6 +17,8 @@ from server.robots.context import RobotContext
 
 _POINTS_RATE_HZ = 5.0
 _LOG_RATE_HZ = 10.0
+#: Faster than two close-ups of a point follow each other.
+_PICTURES_RATE_HZ = 5.0
 #: Sessions of removed accounts end within this time (s).
 _ACCOUNTS_PERIOD_S = 0.5
 #: Distinct rejected messages that are logged.
@@ -44,6 +46,7 @@ class Loop:
             _every(1 / robot.config.teleop_rate_hz, self._send_teleop),
             _every(1 / _POINTS_RATE_HZ, self._update_points),
             _every(1 / _LOG_RATE_HZ, self._update_log),
+            _every(1 / _PICTURES_RATE_HZ, self._keep_pictures),
         ]
 
     async def _send_heartbeat(self, now: float) -> None:
@@ -67,6 +70,12 @@ class Loop:
         robot.pages.show_points(points)
         robot.teleop.follow_tool(now)
         await robot.scene_updater.update(points, now)
+
+    async def _keep_pictures(self, now: float) -> None:
+        robot, controller = self._robot, self._robot.link.controller.peek()
+        # A replay has the pictures of its recording.
+        if controller is not None and robot.link.replay.peek() is None:
+            await robot.pictures.step(controller.message.queue)
 
     async def _update_log(self, now: float) -> None:
         robot = self._robot

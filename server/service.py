@@ -16,10 +16,12 @@ from starlette.types import ASGIApp
 from rolling_panda import reasons
 from rolling_panda.bounds import wider
 from rolling_panda.config import load_section
+from rolling_panda.cut_pictures import PictureFolder
 from rolling_panda.errors import InputError
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.runtime.process import ProcessContext, wire_config
 from rolling_panda.runtime.scheduling import freeze_heap
+from rolling_panda.runtime.state_folder import usual_state_folder
 from rolling_panda.transport.zenoh import Transport
 from server.app import create_app
 from server.auth.access import Access, Tls, access
@@ -83,7 +85,17 @@ def run(context: ProcessContext) -> None:
             for name in arguments.also_robot_id:
                 wires[name] = others.enter_context(Transport(context.wire, "server", name))
             asyncio.run(
-                serve(config, wires, sessions, listener, address, context.stopping, access_options, freeze_heap)
+                serve(
+                    config,
+                    wires,
+                    sessions,
+                    listener,
+                    address,
+                    context.stopping,
+                    access_options,
+                    freeze_heap,
+                    arguments.state or usual_state_folder(arguments.robot_id),
+                )  # fmt: skip
             )
 
 
@@ -96,6 +108,7 @@ async def serve(
     stopping: threading.Event,
     access_options: Access | None = None,
     on_ready: Callable[[], None] = lambda: None,
+    state: Path | None = None,
 ) -> None:
     """Serve the page on `listener` until `stopping` is set.
 
@@ -108,6 +121,7 @@ async def serve(
         stopping: Ends the server.
         access_options: Users and TLS.
         on_ready: Called before the first request is served.
+        state: Folder of what survives a restart, the pictures of cuts; it is made with the first. None keeps nothing.
     """
     access_options = access_options or Access()
     port = int(listener.getsockname()[1])
@@ -123,7 +137,9 @@ async def serve(
     model = RobotModel()
     solids = build_solids()
     for name, wire in wires.items():
-        app_state.robots[name] = _robot_context(config, wire, model, solids, app_state)
+        app_state.robots[name] = _robot_context(
+            config, wire, model, solids, app_state, None if state is None else state / "pictures" / name
+        )
     own = {f"{access_options.scheme}://{name}:{port}" for name in ("127.0.0.1", "localhost")}
     origins = frozenset({*own, *config.origins})
     app = create_app(app_state, origins)
@@ -152,7 +168,12 @@ async def serve(
 
 
 def _robot_context(
-    config: ServerConfig, wire: Transport, model: RobotModel, solids: Solids, app_state: AppState
+    config: ServerConfig,
+    wire: Transport,
+    model: RobotModel,
+    solids: Solids,
+    app_state: AppState,
+    pictures: Path | None,
 ) -> RobotContext:
     """The context of the robot on this wire, with its own 3-D view."""
     loop = asyncio.get_running_loop()
@@ -178,6 +199,7 @@ def _robot_context(
         scene,
         PageView(link, model, widened, wire.plain),
         held_elsewhere=lambda session: app_state.held_elsewhere(session, robot),
+        picture_folder=None if pictures is None else PictureFolder(pictures, config.cut_pictures),
     )
     for relaxed in widened:
         robot.log.note(reasons.limits_relaxed(relaxed))

@@ -1,4 +1,4 @@
-"""Report of a session, built from durable ledger rows. No clock: each row has its time."""
+"""Report and timeline of a session, built from durable ledger rows. No clock: each row has its time."""
 
 from collections import deque
 from collections.abc import Iterable
@@ -10,7 +10,15 @@ from msgspec.structs import replace
 from controller.ledger.journal import RequestRow, TicketRow
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
-from rolling_panda.messages.supervision import ControlReport, CutReport, RefusalReport, SessionReport, VineReport
+from rolling_panda.messages.supervision import (
+    ControlReport,
+    CutReport,
+    RefusalReport,
+    SessionReport,
+    Timeline,
+    VineReport,
+)
+from rolling_panda.timeline import TimelineBuilder
 
 #: Largest number of each in the message; the ledger has all.
 _MOST_CUTS, _MOST_REFUSALS, _MOST_CHANGES = 500, 100, 100
@@ -20,7 +28,7 @@ _CONTROL = (intents.TakeControl, intents.GrantControl, intents.ReturnControl)
 
 
 class SessionReportBuilder:
-    """Builds the `report` from rows in their order."""
+    """Builds the `report` and the `timeline` from rows in their order."""
 
     def __init__(self) -> None:
         """Nothing has happened."""
@@ -34,9 +42,10 @@ class SessionReportBuilder:
         self._refusals: deque[RefusalReport] = deque(maxlen=_MOST_REFUSALS)
         self._control: deque[ControlReport] = deque(maxlen=_MOST_CHANGES)
         self._refused = 0
+        self._timeline = TimelineBuilder()
 
     def add(self, at: str, body: msgspec.Struct) -> bool:
-        """Add a row with its time (ISO 8601). Returns whether it changes the report."""
+        """Add a row with its time (ISO 8601). Returns whether it changes the report or the timeline."""
         when = datetime.fromisoformat(at).timestamp()
         first = self._began == 0.0
         self._began, self._written = self._began or when, when
@@ -45,6 +54,8 @@ class SessionReportBuilder:
         match body:
             case TicketRow():
                 return self._ticket(body, when) or first
+            case m.LogEvent():
+                return self._timeline.add(when, body) or first
             case RequestRow(reason=m.Reason() as reason):
                 self._refused += 1
                 asked = type(body.asked).__name__
@@ -71,6 +82,10 @@ class SessionReportBuilder:
             refusal_count=self._refused,
             control=tuple(self._control),
         )
+
+    def timeline(self) -> Timeline:
+        """Everything up to now."""
+        return self._timeline.timeline(self._began, self._written)
 
     def _ticket(self, row: TicketRow, when: float) -> bool:
         """Add a row; returns whether it changes the report. A point that is accepted again keeps its last cut id."""
@@ -102,9 +117,7 @@ class SessionReportBuilder:
             cut = CutReport(cut_id=row.cut_id, point_id=point.point_id, vine=point.vine, spur=point.spur, user=row.user)
             self._cuts[row.cut_id] = cut
         elif known is not None and row.state in _ENDED:
-            told = replace(
-                known, outcome=row.state, reason=row.reason, user=row.user or known.user, wrong_by=row.wrong_by
-            )
+            told = replace(known, outcome=row.state, reason=row.reason, wrong_by=row.wrong_by)
             if not known.outcome:
                 # A person may report the outcome later; the robot spends no time on that.
                 told = replace(told, ended_at=when, seconds=max(when - self._ready_since, 0.0))

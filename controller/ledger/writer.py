@@ -51,8 +51,8 @@ class LedgerWriter:
         self._closing = False
         self._state = LedgerState()
         self._account = SessionReportBuilder()
-        #: Report of the durable rows, rebuilt on the writer's thread when it changes.
-        self.report = self._account.report()
+        #: Report and timeline of the durable rows, rebuilt on the writer's thread when they change.
+        self.report, self.timeline = self._account.report(), self._account.timeline()
         self._lines, self._left_out = TokenBucket(_LINES_A_SECOND, _LINES_AT_ONCE), 0
         self._thread = threading.Thread(target=self._run, name="ledger", daemon=True)
         self._thread.start()
@@ -111,7 +111,7 @@ class LedgerWriter:
                 for _ in batch:
                     self._waiting.popleft()
             if any([self._account.add(at, record.body) for at, record in batch]):
-                self.report = self._account.report()
+                self.report, self.timeline = self._account.report(), self._account.timeline()
             self._state = LedgerState(max([self._state.durable, *(record.number for _, record in batch)]))
         if store is not None:
             store.close()

@@ -27,12 +27,14 @@ from rolling_panda.messages.types import (
     NonNegative,
     PlanarPose,
     Process,
+    Program,
     Reason,
     Role,
     Severity,
     Text,
     UnitVector3,
     Vector3,
+    WallTime,
 )
 
 Age = Annotated[float, Meta(ge=0.0, le=1e9)]
@@ -203,6 +205,44 @@ class PageEvents(PageMessage, frozen=True, kw_only=True):
     """
 
     events: tuple[PageEvent, ...]
+
+
+class TopicTraffic(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A topic of the wire, and its messages as the server receives them.
+
+    Attributes:
+        name: Name of the topic.
+        sender: Publishing processes, separated by commas, or "any".
+        nominal_hz: Rate by the topic table; 0 on event.
+        received: Whether the server subscribes to it; the figures below are of what it receives.
+        count: Number of messages.
+        rate_hz: Mean rate of the newest messages; None before the second.
+        age_s: Age of the newest message (s); None before the first.
+        rejected: Number of messages that could not be read.
+    """
+
+    name: str
+    sender: str
+    nominal_hz: NonNegative
+    received: bool
+    count: Count = 0
+    rate_hz: NonNegative | None = None
+    age_s: Age | None = None
+    rejected: Count = 0
+
+
+class Diagnostics(PageMessage, frozen=True, kw_only=True):
+    """Answer of `/api/diagnostics`.
+
+    Attributes:
+        wall_time: Time of the answer by the server's clock (s since 1970).
+        programs: Program of each process that has told it.
+        topics: Every topic of the wire.
+    """
+
+    wall_time: WallTime
+    programs: tuple[Program, ...]
+    topics: tuple[TopicTraffic, ...]
 
 
 class Selected(PageMessage, frozen=True, kw_only=True):

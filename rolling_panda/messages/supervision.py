@@ -28,10 +28,11 @@ from rolling_panda.messages.types import (
     Role,
     Text,
     Vector3,
+    WallTime,
 )
 
-#: Wall clock, seconds since 1970.
-WallTime = Annotated[float, Meta(ge=0.0, le=1e11)]
+#: Seconds of a recording that are replayed a second.
+ReplaySpeed = Annotated[float, Meta(ge=0.5, le=8.0)]
 
 
 class ReplayState(Message, frozen=True, kw_only=True):
@@ -43,6 +44,8 @@ class ReplayState(Message, frozen=True, kw_only=True):
         duration_s: Time from the first to the last message (s).
         position_s: Current position from the beginning (s).
         playing: False while the replay is paused.
+        speed: Seconds of the recording a second.
+        complete: False if its recorder was killed before the end.
     """
 
     name: Text
@@ -50,6 +53,8 @@ class ReplayState(Message, frozen=True, kw_only=True):
     duration_s: NonNegative
     position_s: NonNegative
     playing: bool
+    speed: ReplaySpeed = 1.0
+    complete: bool = True
 
 
 class QueueEntry(Struct, frozen=True, forbid_unknown_fields=True):
@@ -420,7 +425,7 @@ class CutReport(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
         spur: Number of its spur on that vine.
         outcome: Current outcome; empty during the cut.
         reason: Reason for the outcome; None without one.
-        user: Who accepted the point, or reported the outcome.
+        user: Who accepted the point.
         ended_at: Time of its end (s since 1970); 0 during the cut.
         seconds: Time from the end of the previous cut, or from a later start of work, to the end of this cut (s).
         wrong_by: Who has said that it was wrong; empty without anyone.
@@ -510,6 +515,44 @@ class SessionReport(Message, frozen=True, kw_only=True):
     refusals: tuple[RefusalReport, ...] = ()
     refusal_count: Count = 0
     control: tuple[ControlReport, ...] = ()
+
+
+class TimelineEvent(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Something that has happened in a session.
+
+    Attributes:
+        at: Time (s since 1970).
+        kind: Change of mode, cut, cut that did not end as wanted, or refused command.
+        reason: What has happened, as in the log.
+        before: Mode before a change of mode; empty otherwise.
+        mode: Mode after a change of mode; empty otherwise.
+    """
+
+    at: WallTime
+    kind: Literal["mode", "cut", "cut failed", "refusal"]
+    reason: Reason
+    before: Mode | Literal[""] = ""
+    mode: Mode | Literal[""] = ""
+
+
+#: Largest number of events in the message.
+TIMELINE_EVENTS = 500
+
+
+class Timeline(Message, frozen=True, kw_only=True):
+    """Controller or replay → server: what has happened in a session; a replay tells the whole recording.
+
+    Attributes:
+        began_at: Begin of the session (s since 1970); 0 before its first record.
+        ended_at: Its newest record, or the end of the recording (s since 1970).
+        events: The newest events, oldest first.
+        left_out: Number of older events.
+    """
+
+    began_at: WallTime
+    ended_at: WallTime
+    events: Annotated[tuple[TimelineEvent, ...], Meta(max_length=TIMELINE_EVENTS)] = ()
+    left_out: Count = 0
 
 
 JointVelocity = Annotated[float, Meta(ge=-10.0, le=10.0)]

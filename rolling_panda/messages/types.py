@@ -26,6 +26,8 @@ QuatXyzw = tuple[Unit, Unit, Unit, Unit]
 Actuated = tuple[Angle, Angle, Angle, Angle, Angle, Angle, Angle, Angle, Angle]
 #: Velocities of ξ (rad/s).
 ActuatedVelocity = tuple[Speed, Speed, Speed, Speed, Speed, Speed, Speed, Speed, Speed]
+#: Wall clock, seconds since 1970.
+WallTime = Annotated[float, Meta(ge=0.0, le=1e11)]
 Role = Literal["viewer", "operator", "supervisor"]
 Process = Literal["bridge", "controller", "perception", "server"]
 PROCESSES: tuple[Process, ...] = ("bridge", "controller", "perception", "server")
@@ -101,6 +103,20 @@ class Heartbeat(Message, frozen=True, kw_only=True):
 
     process: Process
     sequence: Count
+
+
+class Program(Message, frozen=True, kw_only=True):
+    """The program that a process runs.
+
+    Attributes:
+        process: The sender.
+        version: Version of Rolling Panda.
+        began_at: Start of the process (s since 1970).
+    """
+
+    process: Process
+    version: Annotated[str, Meta(max_length=64)]
+    began_at: WallTime
 
 
 class LogEvent(Message, frozen=True, kw_only=True):

@@ -12,8 +12,8 @@ from concurrent.futures import TimeoutError as FutureTimeoutError
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from rolling_panda import __version__, reasons
 from rolling_panda import messages as m
-from rolling_panda import reasons
 from rolling_panda.topics import SERVICES, TOPICS, Service, Topic
 from rolling_panda.transport.access import CALLERS
 from rolling_panda.transport.inbox import Answered, Inbox, Rejected, Reply, Request
@@ -173,6 +173,7 @@ class Runner:
             if topic.read_by(wire.process):
                 handler = immediate.get(topic.message)
                 wire.subscribe(topic, self._receiver(topic) if handler is None else self._immediate(handler))
+        self._latch(m.Program(process=wire.process, version=__version__, began_at=wall_clock()))
         for service in SERVICES:
             if service.server == wire.process:
                 wire.serve(service, functools.partial(self._ask, service))

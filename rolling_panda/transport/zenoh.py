@@ -25,6 +25,7 @@ from rolling_panda.transport.codec import StrictDecoder, UndecodableError, encod
 from rolling_panda.transport.inbox import Received
 from rolling_panda.transport.rejections import Rejections
 from rolling_panda.transport.settings import certificate_folder, wire_settings
+from rolling_panda.transport.traffic import Traffic
 
 Msg = TypeVar("Msg", bound=m.Message)
 Req = TypeVar("Req", bound=Struct)
@@ -107,7 +108,7 @@ class Onlooker(Closing):
         self.robot_id = robot_id
         #: Whether the wire is unencrypted and open to every program on this machine.
         self.plain = config.plain_wire
-        self.rejections = Rejections()
+        self.rejections, self.traffic = Rejections(), Traffic()
         self.on_reject: Callable[[str, m.Reason], None] = lambda topic, reason: None
         self._present: set[str] = set()
         self._session = _open(config, name, robot_id)
@@ -133,9 +134,14 @@ class Onlooker(Closing):
         `store` must return at once: samples behind it wait.
         """
         decoder = StrictDecoder(topic.message)
+        # A second subscription gets the same messages.
+        if counts := not self.traffic.knows(topic.name):
+            self.traffic.begin(topic.name)
 
         def receive(sample: zenoh.Sample) -> None:
             at = time.monotonic()
+            if counts:
+                self.traffic.add(topic.name, at)
             try:
                 message = decoder.decode(_bounded(sample.payload.to_bytes()))
             except UndecodableError as error:

@@ -11,12 +11,14 @@ from fastapi import APIRouter, Depends, Query, Response
 from pydantic import BaseModel, Field
 
 from rolling_panda import reasons
-from rolling_panda.messages.page import PageEvents, PagePoints, PageState
-from rolling_panda.messages.supervision import CutReport, SessionPlan, SessionReport
+from rolling_panda.cut_pictures import Moment
+from rolling_panda.messages.page import Diagnostics, PageEvents, PagePoints, PageState
+from rolling_panda.messages.supervision import CutReport, SessionPlan, SessionReport, Timeline
 from rolling_panda.reasons import text_of
-from server.api.dependencies import Caller, activity
+from server.api.dependencies import Caller, PointId, activity
 from server.api.responses import INVALID, NOT_FOUND, SIGNED_IN, UNAVAILABLE, answer, message, query
 from server.robots.context import RobotContext
+from server.robots.diagnostics import diagnose
 from server.robots.link import Result
 from server.robots.page_view import addressed
 
@@ -75,6 +77,33 @@ def state_router(robot: RobotContext) -> APIRouter:
             return _no_report()
         headers = {"Content-Disposition": 'attachment; filename="cuts.csv"'}
         return Response(cuts_csv(received.message.cuts), media_type="text/csv", headers=headers)
+
+    @router.get(
+        "/cuts/{cut_id}/{moment}.jpg",
+        tags=["state"],
+        response_class=Response,
+        responses=query("image/jpeg", {204: {"description": "No picture was kept."}}, INVALID),
+    )
+    async def picture(session: Caller, cut_id: PointId, moment: Moment) -> Response:
+        """The picture of a cut, before or after it, the cut in the middle, as JPEG. 204 where none can be shown."""
+        jpeg = await robot.pictures.read(cut_id, moment)
+        if jpeg is None:
+            # Not an error, which a browser's console would show.
+            return Response(status_code=204)
+        return Response(jpeg, media_type="image/jpeg")
+
+    @router.get("/timeline", tags=["state"], responses=query(Timeline, UNAVAILABLE))
+    async def timeline(session: Caller) -> Response:
+        """Changes of mode, cuts and refusals since the controller started, or of the whole recording."""
+        received = robot.link.timeline.peek()
+        if received is None:
+            return answer(Result(503, reasons.not_reported("controller")))
+        return message(received.message)
+
+    @router.get("/diagnostics", tags=["state"], responses=query(Diagnostics))
+    async def diagnostics(session: Caller) -> Response:
+        """Programs of the processes, and how often messages of each topic come to the server."""
+        return message(diagnose(robot.link, time.monotonic()))
 
     @router.get("/robot", tags=["state"], responses=SIGNED_IN)
     async def facts(session: Caller) -> RobotFacts:

@@ -2,8 +2,10 @@
 
 from collections.abc import Callable
 
+from rolling_panda.cut_pictures import PictureFolder
 from server.auth.sessions import Session
 from server.config import ServerConfig
+from server.robots.cut_pictures import CutPictures
 from server.robots.event_log import RobotLog
 from server.robots.link import RobotCommands, RobotLink
 from server.robots.page_view import PageView
@@ -26,6 +28,7 @@ class RobotContext:
         pages: Its open pages.
         commands: To its processes.
         scene_updater: Draws the newest messages.
+        pictures: Of its cuts.
     """
 
     def __init__(
@@ -35,8 +38,18 @@ class RobotContext:
         scene: Scene,
         view: PageView,
         held_elsewhere: Callable[[Session], str] = lambda session: "",
+        picture_folder: PictureFolder | None = None,
     ) -> None:
-        """Tie the parts together; `held_elsewhere` names another robot that a session holds, empty for none."""
+        """Tie the parts together.
+
+        Args:
+            config: Rates and limits.
+            link: To the robot's processes.
+            scene: Its 3-D view.
+            view: Builds the messages of its pages.
+            held_elsewhere: Name of another robot that a session holds; empty for none.
+            picture_folder: Keeps the pictures of cuts; None keeps none.
+        """
         self.config, self.link, self.scene, self.view = config, link, scene, view
         self.log = RobotLog(config.log_lines, link.send_event)
         self.teleop = Teleoperation(
@@ -48,6 +61,8 @@ class RobotContext:
             held_elsewhere,
             lambda owner, reason: self.pages.end_hold(owner, reason),
         )
+        self.pictures = CutPictures(picture_folder, view.model, self.log.note)
+        link.on_close_up = self.pictures.add
         self.scene_updater = SceneUpdater(link, view, scene)
         self.pages = RobotPages(link, scene, self.scene_updater, self.teleop)
         self.commands = RobotCommands(link, self.log, self.pages.view_age_s, self.teleop.stopped, config.stop_confirm_s)

@@ -7,7 +7,7 @@ import asyncio
 import secrets
 import threading
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -15,9 +15,9 @@ from typing import Any
 
 import msgspec
 
+from rolling_panda import __version__, reasons, topics
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
-from rolling_panda import reasons, topics
 from rolling_panda.commands import EvaluateRule, PlantRequest
 from rolling_panda.errors import ServiceError
 from rolling_panda.messages.page import ProcessPresence
@@ -51,6 +51,7 @@ class RobotLink:
     def __init__(self, transport: Transport) -> None:
         """Subscribe to what the page and the 3-D view need."""
         self._transport = transport
+        self.traffic = transport.traffic
         self.joints = transport.slot(topics.JOINTS)
         self.odometry = transport.slot(topics.ODOMETRY)
         self.bridge = transport.slot(topics.BRIDGE)
@@ -59,12 +60,17 @@ class RobotLink:
         self.camera = transport.slot(topics.CAMERA)
         self.images: dict[int, bytes] = {}
         """JPEG of the newest frames, by sequence."""
+        self.on_close_up: Callable[[CameraFrame], None] = lambda frame: None
         transport.subscribe(topics.CAMERA, self._on_frame)
         self.points = transport.slot(topics.POINTS)
         self.plan = transport.slot(topics.PLAN)
         self.preview = transport.slot(topics.PREVIEW)
         self.preview_motion = transport.slot(topics.PREVIEW_MOTION)
         self.report = transport.slot(topics.REPORT)
+        self.timeline = transport.slot(topics.TIMELINE)
+        self.programs: dict[str, m.Program] = {}
+        """The program of each process, of the server too."""
+        transport.subscribe(topics.PROGRAM, self._on_program)
         self.scenery = transport.slot(topics.SCENERY)
         self.obstacles = transport.slot(topics.OBSTACLES)
         self.pictures = PictureStore()
@@ -73,6 +79,7 @@ class RobotLink:
         self.stops: dict[str, Received[StopState]] = {}
         transport.subscribe(topics.STOPS, self._on_stops)
         self.events = transport.feed(topics.EVENT, 500)
+        self.programs["server"] = m.Program(process="server", version=__version__, began_at=time.time())
         self._heard: dict[str, float] = {}
         transport.subscribe(topics.HEARTBEAT, self._on_heartbeat)
         self._stop = transport.publisher(topics.STOP)
@@ -84,7 +91,9 @@ class RobotLink:
         self._callers = ThreadPoolExecutor(max_workers=4, thread_name_prefix="intent")
         self._writer = ThreadPoolExecutor(max_workers=1, thread_name_prefix="event")
         self.refused: deque[tuple[str, m.Reason]] = deque(maxlen=100)
-        transport.on_reject = lambda topic, reason: self.refused.append((topic, reason))
+        self.rejected: Counter[str] = Counter()
+        """Messages that could not be read, by topic."""
+        transport.on_reject = self._on_reject
 
     async def call(self, service: topics.Service[Any], request: object) -> m.Answer:
         """Call a service of another process.
@@ -163,13 +172,22 @@ class RobotLink:
         self._callers.shutdown(wait=False, cancel_futures=True)
         self._writer.shutdown(wait=False, cancel_futures=True)
 
+    def _on_reject(self, topic: str, reason: m.Reason) -> None:
+        self.rejected[topic] += 1
+        self.refused.append((topic, reason))
+
     def _on_frame(self, message: CameraFrame, at: float) -> None:
         self.images[message.sequence] = message.color_jpeg
         if len(self.images) > _MAX_IMAGES:
             del self.images[next(iter(self.images))]
+        if message.point_id:
+            self.on_close_up(message)
 
     def _on_stops(self, message: StopState, at: float) -> None:
         self.stops[message.process] = Received(message, at)
+
+    def _on_program(self, message: m.Program, at: float) -> None:
+        self.programs[message.process] = message
 
     def _on_heartbeat(self, message: m.Heartbeat, at: float) -> None:
         self._heard[message.process] = at

@@ -23,7 +23,11 @@ _TANGENT_STEP = 0.05
 
 
 class PageView:
-    """Builds `PageState` and `PagePoints`. The last known state stays, with its age."""
+    """Builds `PageState` and `PagePoints`. The last known state stays, with its age.
+
+    Attributes:
+        model: Of the robot.
+    """
 
     def __init__(
         self, link: RobotLink, model: RobotModel, relaxed_limits: tuple[m.Reason, ...] = (), plain_wire: bool = False
@@ -38,7 +42,7 @@ class PageView:
         """
         self._relaxed_limits, self._plain_wire = relaxed_limits, plain_wire
         self._link = link
-        self._model = model
+        self.model = model
         self._seen: dict[str, m.PruningPoint] = {}
         self._built_from: tuple[object, ...] = ()
         self._built: PagePoints | None = None
@@ -47,7 +51,7 @@ class PageView:
     @property
     def arm_limits(self) -> tuple[tuple[float, float], ...]:
         """Lower and upper limit of each joint of the arm (rad)."""
-        limits = self._model.limits
+        limits = self.model.limits
         return tuple(zip(limits.lower[ARM_Q].tolist(), limits.upper[ARM_Q].tolist(), strict=True))
 
     def state(self, number: int, viewers: int, now: float) -> PageState:
@@ -83,7 +87,7 @@ class PageView:
                 )
             ),
             plain_wire=self._plain_wire,
-            speed_ratios=() if joints is None else speed_ratios(joints.message, self._model.limits),
+            speed_ratios=() if joints is None else speed_ratios(joints.message, self.model.limits),
         )
 
     def tool(self, now: float) -> m.Pose | None:
@@ -91,11 +95,11 @@ class PageView:
         posture = self._link.posture(now)
         if posture is None:
             return None
-        return pose_message(self._model.pose(configuration(posture.base, posture.position), self._model.tool_id))
+        return pose_message(self.model.pose(configuration(posture.base, posture.position), self.model.tool_id))
 
     def camera(self, frame: CameraFrame) -> m.Pose:
         """T_odom_camera when a frame was taken."""
-        return pose_message(self._model.pose(configuration(frame.base, frame.position), self._model.camera_id))
+        return pose_message(self.model.pose(configuration(frame.base, frame.position), self.model.camera_id))
 
     def points(self, now: float) -> PagePoints:
         """All points in the order of work; points that perception no longer reports stay while they are queued.
@@ -142,8 +146,8 @@ class PageView:
             for point in points
             if point.point_id not in queued
         ]
-        pixels = project([point.position for point, _ in rows], camera, self._model)
-        ahead = project([_ahead(point) for point, _ in rows], camera, self._model)
+        pixels = project([point.position for point, _ in rows], camera, self.model)
+        ahead = project([_ahead(point) for point, _ in rows], camera, self.model)
         planned = {} if plan is None or plan.state != "valid" else {each.point_id: each for each in plan.points}
         return PagePoints(
             points=tuple(

@@ -7,8 +7,9 @@ from msgspec.structs import replace
 from controller.ledger.journal import RequestRow, TicketRow
 from controller.ledger.session_report import SessionReportBuilder
 from rolling_panda import commands as intents
+from rolling_panda import messages as m
 from rolling_panda import reasons
-from rolling_panda.messages.supervision import SessionReport
+from rolling_panda.messages.supervision import SessionReport, Timeline
 from rolling_panda.messages.types import Answer
 from rolling_panda.transport.codec import StrictDecoder, encode
 from tests.support.fake_wire import pruning_point
@@ -29,6 +30,10 @@ STANDS, LATE = reasons.stands_not_cut(reasons.cutter_missed()), reasons.not_reac
 
 def asked(intent, reason=None):
     return RequestRow(asked=intent, reason=reason, mode="READY")
+
+
+def line(process, reason):
+    return m.LogEvent(header=m.Header(), process=process, reason=reason)
 
 
 def report(*rows):
@@ -61,6 +66,38 @@ def test_a_cut_takes_from_the_one_before_or_from_the_start_of_work():
         (1, 1, 0, 4.0),
         (2, 0, 1, 3.5),
     ]
+
+
+def test_the_timeline_tells_modes_cuts_and_refusals_and_no_other_line():
+    builder = SessionReportBuilder()
+    lines = (
+        reasons.mode_changed("IDLE", "READY", reasons.said("armed")),
+        reasons.points_accepted("ada", 3, 0.8),
+        reasons.cut_done("a", reasons.cut_and_gone()),
+        reasons.cut_ended("b", STANDS),
+        reasons.teleoperation_refused(reasons.control_held("ada")),
+        reasons.robot_halted("AUTO", "ESTOP_LATCHED", reasons.said("a dog")),
+    )
+    changed = [builder.add(at(float(n)), line("controller", reason)) for n, reason in enumerate(lines)]
+    assert changed == [True, False, True, True, True, True]
+    assert not builder.add(at(9.0), line("perception", lines[2])), "only the controller decides about cuts"
+    told = StrictDecoder(Timeline).decode(encode(builder.timeline()))
+    assert [(round(each.at - BEGAN, 3), each.kind, each.mode) for each in told.events] == [
+        (0.0, "mode", "READY"),
+        (2.0, "cut", ""),
+        (3.0, "cut failed", ""),
+        (4.0, "refusal", ""),
+        (5.0, "mode", "ESTOP_LATCHED"),
+    ]
+    assert (told.began_at, told.ended_at) == (BEGAN, BEGAN + 9.0)
+
+
+def test_a_long_session_keeps_its_newest_events_and_counts_the_others():
+    builder = SessionReportBuilder()
+    for n in range(520):
+        builder.add(at(float(n)), line("controller", reasons.cut_done(f"p{n}", reasons.cut_and_gone())))
+    told = StrictDecoder(Timeline).decode(encode(builder.timeline()))
+    assert (len(told.events), told.left_out, told.events[0].at) == (500, 20, BEGAN + 20.0)
 
 
 def test_a_point_that_is_given_up_before_the_blades_close_is_told_each_time_it_was_tried():
@@ -107,10 +144,10 @@ def test_who_says_later_how_a_cut_ended_takes_the_robot_no_time():
         (0.0, asked(intents.Start(user="ada"))),
         (3.0, ticket("a", "CUTTING", user="ada")),
         (5.0, ticket("a", "UNKNOWN", user="ada")),
-        (500.0, ticket("a", "DONE", user="bob", reason=reasons.said("seen by eye"))),
+        (500.0, ticket("a", "DONE", user="ada", reason=reasons.inspected("bob", "seen by eye"))),
     )
     (cut,) = told.cuts
-    assert (cut.outcome, cut.user, cut.seconds) == ("DONE", "bob", 5.0)
+    assert (cut.outcome, cut.user, cut.seconds) == ("DONE", "ada", 5.0)
     assert told.vines[0].unknown == 0 and told.vines[0].done == 1
 
 

@@ -1,19 +1,22 @@
 """What of a recording is told when."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import msgspec
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from recorder.player import Player
 from recorder.recording import RecordedMessage, Recording
 from rolling_panda import messages as m
-from rolling_panda import topics
+from rolling_panda import reasons, topics
 from rolling_panda.commands import SeekReplay
 from rolling_panda.reasons import said, text_of
 from rolling_panda.topics import Topic
+from rolling_panda.transport.codec import StrictDecoder, UndecodableError, encode
 
 BEGAN = 1.8e9
 
@@ -81,6 +84,57 @@ def test_standing_still_it_keeps_fresh_what_is_told_often_and_stays_where_it_is(
     assert {k for messages in told for k in messages} == {30}
     assert sum(map(len, told)) >= 15
     assert (player.state.position_s, player.state.playing) == (3.0, False)
+
+
+def test_at_another_speed_it_covers_more_or_less_of_the_recording_and_leaves_nothing_out() -> None:
+    player = Player(recording(), "a.mcap", 0.0)
+    player.seek(SeekReplay(speed=4.0))
+    told = sequences([message for k in range(1, 21) for message in player.step(0.1 * k)])
+    assert told == list(range(81)) and player.state.speed == 4.0
+    # A jump or a pause keeps the speed.
+    player.seek(SeekReplay(position_s=1.0, playing=False))
+    player.step(2.1)
+    player.seek(SeekReplay(playing=True))
+    player.step(3.1)
+    assert round(player.state.position_s, 6) == 5.0
+    player.seek(SeekReplay(speed=0.5))
+    player.step(4.1)
+    assert round(player.state.position_s, 6) == 5.5
+
+
+@pytest.mark.parametrize("speed", [0.0, 0.49, 8.1, -1.0])
+def test_a_speed_out_of_range_is_refused(speed: float) -> None:
+    with pytest.raises(UndecodableError):
+        StrictDecoder(SeekReplay).decode(encode(SeekReplay(speed=speed)))
+
+
+def controller_line(at: float, reason: m.Reason) -> RecordedMessage:
+    return recorded(topics.EVENT, at, m.LogEvent(header=m.Header(), process="controller", reason=reason))
+
+
+def test_the_timeline_is_of_the_whole_recording_wherever_it_stands() -> None:
+    lines = (
+        controller_line(1.0, reasons.mode_changed("READY", "AUTO", said("started by Ada"))),
+        controller_line(4.0, reasons.cut_done("p1", reasons.cut_and_gone())),
+        controller_line(5.0, reasons.robot_halted("AUTO", "PAUSED", said("a branch"))),
+        controller_line(6.0, reasons.command_refused("Bob", "start", reasons.control_held("Ada"))),
+    )
+    player = Player(recording(event(2.0, "nothing of the controller's"), *lines), "a.mcap", 0.0)
+    timeline = player.timeline
+    assert (timeline.began_at, timeline.ended_at) == (BEGAN, BEGAN + 10.0)
+    assert [(round(each.at - BEGAN, 6), each.kind, each.before, each.mode) for each in timeline.events] == [
+        (1.0, "mode", "READY", "AUTO"),
+        (4.0, "cut", "", ""),
+        (5.0, "mode", "AUTO", "PAUSED"),
+        (6.0, "refusal", "", ""),
+    ]
+
+
+def test_a_recording_without_events_has_an_empty_timeline_and_one_that_was_cut_short_says_so() -> None:
+    assert Player(recording(), "a.mcap", 0.0).timeline.events == ()
+    whole = recording()
+    assert Player(whole, "a.mcap", 0.0).state.complete
+    assert not Player(replace(whole, complete=False), "a.mcap", 0.0).state.complete
 
 
 def test_it_ends_standing_at_the_end() -> None:

@@ -10,6 +10,7 @@ from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.reasons import said
 from rolling_panda.transport.codec import StrictDecoder, encode
+from rolling_panda.transport.traffic import Traffic
 from rolling_panda.transport.zenoh import Feed, Slot
 from tests.support.points import point
 
@@ -46,12 +47,15 @@ class FakeWire:
         self.on_reject = lambda topic, reason: None
         self.services = {}
         self._stores = defaultdict(list)
+        self.traffic = Traffic()
 
     def publisher(self, topic):
         return FakePublisher(topic, self.sent[topic.name])
 
     def subscribe(self, topic, store):
         self._stores[topic.name].append(store)
+        if not self.traffic.knows(topic.name):
+            self.traffic.begin(topic.name)
 
     def slot(self, topic):
         slot = Slot()
@@ -78,8 +82,11 @@ class FakeWire:
 
     def deliver(self, topic, message, at=None):
         """A message comes in on `topic`."""
+        at = time.monotonic() if at is None else at
+        if self._stores[topic.name]:
+            self.traffic.add(topic.name, at)
         for store in self._stores[topic.name]:
-            store(message, time.monotonic() if at is None else at)
+            store(message, at)
 
 
 HEADER = m.Header(stamp=0.0, frame_id="odom")

@@ -60,8 +60,8 @@ class RunningServer:
 
 
 @contextlib.contextmanager
-def running_server(wire, config=None, access=None, **others):
-    """`wire` is that of the robot `rp1`; further robots are given by their names."""
+def running_server(wire, config=None, access=None, state=None, **others):
+    """`wire` is that of the robot `rp1`; further robots are given by their names. `state` is the folder of its state."""
     # Otherwise the first test would wait for them while its server starts.
     build_solids()
     sessions = Sessions(3600.0)
@@ -69,7 +69,8 @@ def running_server(wire, config=None, access=None, **others):
     with listen("127.0.0.1", 0) as listener:
         access = access or Access()
         address = f"{access.scheme}://127.0.0.1:{listener.getsockname()[1]}"
-        work = serve(config or ServerConfig(), {"rp1": wire, **others}, sessions, listener, address, stopping, access)
+        wires = {"rp1": wire, **others}
+        work = serve(config or ServerConfig(), wires, sessions, listener, address, stopping, access, state=state)
         failure = []
 
         def run():

@@ -373,6 +373,10 @@ export interface ReplayState {
   position_s: number;
   /** False while the replay is paused. */
   playing: boolean;
+  /** Seconds of the recording a second. */
+  speed: number;
+  /** False if its recorder was killed before the end. */
+  complete: boolean;
 }
 
 /** 10 Hz: state of the robot. The last known state stays, with its age. */
@@ -730,7 +734,7 @@ export interface CutReport {
   outcome: Outcome;
   /** Reason for the outcome; None without one. */
   reason: Reason|null;
-  /** Who accepted the point, or reported the outcome. */
+  /** Who accepted the point. */
   user: string;
   /** Time of its end (s since 1970); 0 during the cut. */
   ended_at: number;
