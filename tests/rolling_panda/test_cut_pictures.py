@@ -109,7 +109,9 @@ def test_the_oldest_pictures_give_way(tmp_path):
     assert sorted(each.name for each in tmp_path.iterdir()) == [f"c{number}.after.jpg" for number in (2, 3, 4)]
 
 
-@pytest.mark.parametrize("damage", [lambda data: data[: len(data) // 2], lambda data: b"", lambda data: b"not a picture"])
+@pytest.mark.parametrize(
+    "damage", [lambda data: data[: len(data) // 2], lambda data: b"", lambda data: b"not a picture"]
+)
 def test_a_damaged_picture_is_an_error(tmp_path, damage):
     folder = PictureFolder(tmp_path, 3)
     folder.keep("c1", "after", jpeg())

@@ -18,6 +18,7 @@ from rolling_panda.messages.supervision import (
     SessionReport,
     StopRecord,
     StopState,
+    Timeline,
 )
 from rolling_panda.messages.types import PlanarPose
 from tests.support.fake_wire import (
@@ -70,6 +71,7 @@ class Answering(FakeWire):
         self.deliver(topics.CAMERA, FRAME)
         self.deliver(topics.PLAN, SessionPlan(header=HEADER, state="planning"))
         self.deliver(topics.REPORT, SessionReport(began_at=1.0, written_at=2.0))
+        self.deliver(topics.TIMELINE, Timeline(began_at=1.0, ended_at=2.0))
         self.deliver(topics.REPLAY, ReplayState(name="x", begins_at=1.0, duration_s=2.0, position_s=1.0, playing=False))
         self.deliver(topics.PREVIEW, PreviewState(header=HEADER, required=False, phase="ready", preview_hash="0f",
                      start=PlanarPose(0.0, 0.0, 0.0), position=joints().position))  # fmt: skip

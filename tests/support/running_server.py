@@ -61,7 +61,7 @@ class RunningServer:
 
 @contextlib.contextmanager
 def running_server(wire, config=None, access=None, state=None, **others):
-    """`wire` is that of the robot `rp1`; further robots are given by their names. `state` is the folder of its state."""
+    """`wire` is that of the robot `rp1`; further robots are given by their names. `state` is a folder."""
     # Otherwise the first test would wait for them while its server starts.
     build_solids()
     sessions = Sessions(3600.0)
