@@ -9,10 +9,10 @@ import pytest
 from hypothesis import Phase, settings
 from playwright.sync_api import sync_playwright
 
-from tests.support.played_page import browser, close_browser, page, server, tab
+from tests.support.played_page import browser, close_browser, page, screen, server, tab
 from tests.support.processes.local_router import local_router
 
-__all__ = ["browser", "page", "server", "tab"]
+__all__ = ["browser", "page", "screen", "server", "tab"]
 
 # A time limit for each example would judge how busy the machine is, not the code. The same examples each time, so that
 # a change fails for what it changed; `HYPOTHESIS_PROFILE=explore make test` looks for new ones; `make fast` uses few.

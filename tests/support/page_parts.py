@@ -61,10 +61,18 @@ def working(page: Page, server: PlayedServer) -> None:
     """Where most states begin: armed, with a queue."""
     show_mode(page, server, ready())
     show(server, *queue())
-    expect(page.locator("rp-preview")).to_be_visible()
+    expect(page.locator("#start")).to_be_visible()
+
+
+def open_screen(page: Page, name: str) -> None:
+    """By its tab; a screen is fetched when it is first opened."""
+    page.locator(f'[data-tab="{name}"]').click()
+    expect(page.locator("main")).to_have_attribute("data-screen", name)
+    expect(page.locator(f"rp-{name}:defined")).to_be_visible()
 
 
 def choose(page: Page, name: str) -> None:
+    open_screen(page, "review")
     page.locator(f'rp-point[data-point-id="{name}"]').click(position={"x": 60, "y": 12})
     expect(page.locator("rp-point-details .crop.loaded")).to_be_visible()
 
@@ -78,9 +86,9 @@ def leave(page: Page, server: PlayedServer) -> None:
     if lost:
         expect(page.locator("rp-link-banner")).to_be_hidden(timeout=10_000)
     server.tell(p.PagePreview(preview=PreviewState(header=m.Header(), required=False, phase="none")))
-    for opened in ("#close-drawer", '#teleop[aria-pressed="true"]'):
-        if page.locator(opened).is_visible():
-            page.locator(opened).click()
+    if page.locator("#close-preview").is_visible():
+        page.locator("#close-preview").click()
+    open_screen(page, "work")
     page.locator("details[open]").evaluate_all("all => all.forEach(each => { each.open = false; })")
 
 

@@ -22,7 +22,18 @@ from rolling_panda.messages.supervision import (
 )
 from rolling_panda.reasons import said
 from server.api.responses import outcome
-from tests.support.page_parts import accepted, choose, held, planned, queue, ready, show, show_mode, working
+from tests.support.page_parts import (
+    accepted,
+    choose,
+    held,
+    open_screen,
+    planned,
+    queue,
+    ready,
+    show,
+    show_mode,
+    working,
+)
 from tests.support.played_server import PlayedServer, bridge, controller, point
 from tests.support.points import rolled_out
 
@@ -47,11 +58,13 @@ def _no_points(page: Page, server: PlayedServer) -> None:
     show_mode(page, server, controller("IDLE", reason="the program has just started"))
     server.undecided_sites = ()
     show(server)
+    open_screen(page, "review")
     expect(page.locator("rp-point")).to_have_count(0)
 
 
 def _process_lost(page: Page, server: PlayedServer) -> None:
     working(page, server)
+    open_screen(page, "review")
     server.gone = {"controller": 6.0}
     expect(page.locator("rp-queue.stale .stale-note")).not_to_be_empty()
 
@@ -99,6 +112,7 @@ def _rule(page: Page, server: PlayedServer) -> None:
     server.rule = m.PruningRule(system="guyot")
     server.tell(server.page_points())
     server.answers["/api/rule/what-if"] = (200, outcome(True, reasons.rule_effect(17, 3, 5, 4)))
+    open_screen(page, "review")
     page.locator("rp-rule summary").click()
     expect(page.locator("rp-rule input").first).to_be_visible()
     if server.role != "viewer":
@@ -109,6 +123,7 @@ def _rule(page: Page, server: PlayedServer) -> None:
 def _order(page: Page, server: PlayedServer) -> None:
     show_mode(page, server, ready(order=m.QueueOrder(7, "Bob")))
     show(server, *(accepted(number, number) for number in range(1, 6)))
+    open_screen(page, "review")
     page.locator("rp-order summary").click()
     expect(page.locator(".order-row").first).to_be_visible()
     page.locator(".order-row").nth(1).click()
@@ -116,12 +131,14 @@ def _order(page: Page, server: PlayedServer) -> None:
 
 def _why_rejected(page: Page, server: PlayedServer) -> None:
     working(page, server)
+    open_screen(page, "review")
     page.locator('rp-point[data-point-id="p3"] .reject').click()
     expect(page.locator("#reject-reason")).to_be_focused()
 
 
 def _by_hand(page: Page, server: PlayedServer) -> None:
     working(page, server)
+    open_screen(page, "review")
     page.locator("#add-by-hand").click()
     expect(page.locator("rp-placing")).to_be_visible()
 
@@ -135,6 +152,7 @@ def _places(page: Page, server: PlayedServer) -> None:
         m.UndecidedSite(reasons.wire_near_cut(6.0), "operator", 3, 4, where),
     )
     server.tell(server.page_points())
+    open_screen(page, "review")
     page.locator(".undecided-sites summary").first.click()
     expect(page.locator("button.look-again").first).to_be_visible()
 
@@ -178,6 +196,7 @@ def _preview(page: Page, server: PlayedServer) -> None:
         header=m.Header(), required=True, phase="ready", preview_hash="ab" * 32, duration_s=10.0, cuts=cuts
     )
     server.tell(p.PagePreview(preview=state))
+    page.locator("#show-preview").click()
     page.locator("#preview-time").fill("6.2")
     expect(page.locator(".preview-words")).to_contain_text("p2: ")
 
@@ -194,6 +213,7 @@ def _preview_expired(page: Page, server: PlayedServer) -> None:
 
 def _by_hand_tool(page: Page, server: PlayedServer) -> None:
     working(page, server)
+    open_screen(page, "drive")
     page.locator("#teleop").click()
     expect(page.locator('[data-choice="world"]')).to_be_visible()
 
@@ -285,6 +305,7 @@ def _invite(page: Page, server: PlayedServer) -> None:
     working(page, server)
     link = "http://127.0.0.1:8000/sign-in?token=1s0n1y-4n-3x4mp13"
     server.answers["/api/invite"] = (200, {"ok": True, "reason": "", "link": link})
+    page.locator("#person").click()
     page.locator("#invite").click()
     page.locator("#invite-user").fill("Bob")
     page.locator("#invite-make").click()
@@ -294,6 +315,7 @@ def _invite(page: Page, server: PlayedServer) -> None:
 def _refused(page: Page, server: PlayedServer) -> None:
     working(page, server)
     server.answers["/api/points/p3/accept"] = (409, {"ok": False, "reason": "p3 moved by 6 mm since you looked at it"})
+    open_screen(page, "review")
     page.locator('rp-point[data-point-id="p3"] .accept').click()
     expect(page.locator(".toast")).to_be_visible()
 
@@ -309,13 +331,13 @@ def _replay(page: Page, server: PlayedServer) -> None:
 
 def _charts(page: Page, server: PlayedServer) -> None:
     working(page, server)
-    page.locator('[data-opens="charts"]').click()
+    open_screen(page, "engineer")
     expect(page.locator("rp-charts")).to_be_visible()
 
 
 def _empty_report(page: Page, server: PlayedServer) -> None:
     working(page, server)
-    page.locator('[data-opens="report"]').click()
+    open_screen(page, "report")
     expect(page.locator("rp-report section .hint").first).not_to_be_empty()
 
 
@@ -339,7 +361,7 @@ def _report(page: Page, server: PlayedServer) -> None:
         refusal_count=1,
         control=(ControlReport(at=MORNING + 5.0, user="Ada", asked="TakeControl"),),
     )
-    page.locator('[data-opens="report"]').click()
+    open_screen(page, "report")
     expect(page.locator("rp-report tbody tr").first).to_be_visible()
 
 

@@ -136,6 +136,7 @@ def opened(tab: Page, attach: Callable[[Page], None], path: str, width: int, hei
     attach(tab)
     tab.goto(f"{ORIGIN}{path}")
     expect(tab.locator("#mode")).to_have_attribute("data-mode", "READY")
+    expect(tab.locator("main .screen:visible:defined")).to_have_count(1)
     try:
         yield tab
     finally:
@@ -146,8 +147,14 @@ def opened(tab: Page, attach: Callable[[Page], None], path: str, width: int, hei
 
 
 @pytest.fixture
-def page(tab: Page, server: PlayedServer) -> Iterator[Page]:
-    with opened(tab, server.attach, "/", 1280, 800) as page:
+def screen() -> str:
+    """The screen that the page opens with; a module about another one says so."""
+    return "work"
+
+
+@pytest.fixture
+def page(tab: Page, server: PlayedServer, screen: str) -> Iterator[Page]:
+    with opened(tab, server.attach, f"/#{screen}", 1280, 800) as page:
         expect(page.locator("rp-scene iframe")).to_have_class("loaded")
         yield page
 

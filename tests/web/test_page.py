@@ -10,10 +10,16 @@ from rolling_panda import reasons
 from rolling_panda.messages import page as p
 from rolling_panda.reasons import text_of
 from tests.support.page_host import STAND_STILL
+from tests.support.page_parts import open_screen
 from tests.support.played_page import box_of, until
 from tests.support.played_server import ORIGIN, PlayedServer, bridge, controller, point
 
 pytestmark = pytest.mark.browser
+
+
+@pytest.fixture
+def screen() -> str:
+    return "review"
 
 
 def test_shows_the_queue_by_vine_and_spur_and_selects(page: Page, server: PlayedServer) -> None:
@@ -26,6 +32,7 @@ def test_shows_the_queue_by_vine_and_spur_and_selects(page: Page, server: Played
     expect(page.locator(".mark.selected")).to_have_attribute("data-state", "ACCEPTED")
     server.tell(p.Selected(point_id="p3"))
     expect(page.locator('[data-point-id="p3"]')).to_have_attribute("aria-current", "true")
+    page.locator("#swap").click()
     page.locator(".mark").first.click()
     until(page, lambda: p.Select(point_id="p1") in server.said)
 
@@ -92,11 +99,12 @@ def test_only_what_the_controller_allows_is_enabled_and_the_rest_says_why(page: 
 
 
 def test_a_greyed_button_does_nothing_and_says_why_to_a_finger(page: Page, server: PlayedServer) -> None:
-    refused = reasons.impossible_in_ready("pause")
-    server.controller = controller("READY", allowed=controller().allowed | {"Pause": refused})
-    pause = page.locator("#pause")
-    expect(pause).to_have_attribute("title", text_of(refused))
-    pause.click(force=True)
+    refused = reasons.preview_needed()
+    server.controller = controller("READY", allowed=controller().allowed | {"Start": refused})
+    start = page.locator("#start")
+    expect(start).to_have_attribute("title", text_of(refused))
+    expect(page.locator(".next-why")).to_have_text(text_of(refused))
+    start.click(force=True)
     expect(page.locator(".toast")).to_contain_text(text_of(refused))
     page.locator('[data-point-id="p3"] button.accept').click(force=True)
     expect(page.locator(".toast").last).to_contain_text("p3 is Done")
@@ -108,13 +116,14 @@ def test_a_greyed_button_does_nothing_and_says_why_to_a_finger(page: Page, serve
 
 
 def test_it_says_that_it_is_a_simulation_and_what_tells_wood_from_wire(page: Page, server: PlayedServer) -> None:
-    expect(page.locator("rp-camera .panel-head")).to_contain_text("simulation")
+    expect(page.locator("rp-camera .tag")).to_contain_text("simulation")
     expect(page.locator("rp-queue .panel-head")).to_contain_text("simulator labels")
     server.bridge = bridge(kind="real")
-    expect(page.locator("rp-camera .panel-head")).not_to_contain_text("simulation")
+    expect(page.locator("rp-camera .tag")).not_to_contain_text("simulation")
 
 
 def test_the_log_has_the_words_of_the_page(page: Page, server: PlayedServer) -> None:
+    open_screen(page, "engineer")
     changed = reasons.mode_changed("READY", "AUTO", reasons.said("start by Ada"))
     server.tell(p.PageEvents(events=(server.event(2, "info", changed),)))
     expect(page.locator("#log li .text").last).to_have_text("Ready → Automatic: start by Ada")
@@ -123,6 +132,7 @@ def test_the_log_has_the_words_of_the_page(page: Page, server: PlayedServer) -> 
 def test_what_only_engineers_read_is_behind_a_disclosure_that_tells_its_warnings(
     page: Page, server: PlayedServer
 ) -> None:
+    open_screen(page, "engineer")
     gauge = page.locator('[data-gauge="manipulability"]')
     expect(gauge).to_be_hidden()
     expect(page.locator('[data-gauge="joint-margin"]')).to_be_visible()
@@ -136,6 +146,7 @@ def test_what_only_engineers_read_is_behind_a_disclosure_that_tells_its_warnings
 def test_a_supervisor_makes_a_link_for_somebody_else(page: Page, server: PlayedServer) -> None:
     server.answers["/api/invite"] = (200, {"ok": True, "reason": "", "link": "http://127.0.0.1:8000/sign-in?token=abc"})
     expect(page.locator("#invite-user")).to_be_hidden()
+    page.locator("#person").click()
     page.locator("#invite").click()
     page.locator("#invite-user").fill("a script")
     page.locator("#invite-role").select_option("operator")
@@ -155,6 +166,7 @@ def test_a_supervisor_makes_a_link_for_somebody_else(page: Page, server: PlayedS
 
 def test_a_refusal_is_a_notice_and_a_line_of_the_log(page: Page, server: PlayedServer) -> None:
     server.answers["/api/start"] = (409, {"ok": False, "reason": "the base has not settled"})
+    open_screen(page, "engineer")
     page.locator("#start").click()
     words = "Start refused: the base has not settled"
     expect(page.locator(".toast")).to_contain_text(words)
@@ -162,6 +174,7 @@ def test_a_refusal_is_a_notice_and_a_line_of_the_log(page: Page, server: PlayedS
     server.tell(p.PageEvents(events=(server.event(2, "warning", "Start by Ada refused"),)))
     expect(page.locator("#log li").last).to_contain_text("Start by Ada refused")
     server.answers["/api/home"] = (403, {"ok": False, "reason": "a viewer may look and stop, not operate"})
+    page.locator("#more").click()
     page.locator("#home").click()
     expect(page.locator("#log li").last).to_contain_text("Home refused: a viewer may look and stop")
     server.tell(p.PageEvents(events=(server.event(3, "info", "nothing to worry about"),)))
@@ -210,6 +223,7 @@ def test_a_stop_that_does_not_get_through_says_so(page: Page, server: PlayedServ
 
 
 def test_the_tool_moves_only_while_held(page: Page, server: PlayedServer) -> None:
+    open_screen(page, "drive")
     expect(page.locator("#hold")).to_be_disabled()
     page.locator("#teleop").click()
     until(page, lambda: p.ShowGizmo(visible=True) in server.said)
@@ -228,6 +242,7 @@ def test_the_tool_moves_only_while_held(page: Page, server: PlayedServer) -> Non
 
 @pytest.mark.parametrize("end", ["blur", "hidden", "mode", "link"])
 def test_a_hold_ends_when_the_operator_can_no_longer_mean_it(page: Page, server: PlayedServer, end: str) -> None:
+    open_screen(page, "drive")
     page.locator("#teleop").click()
     page.locator("h1").click()
     page.keyboard.down("h")
@@ -251,6 +266,7 @@ def test_a_hold_ends_when_the_operator_can_no_longer_mean_it(page: Page, server:
 
 
 def test_a_hold_that_the_server_ended_goes_on_only_when_pressed_again(page: Page, server: PlayedServer) -> None:
+    open_screen(page, "drive")
     page.locator("#teleop").click()
     page.locator("h1").click()
     page.keyboard.down("h")
@@ -270,6 +286,7 @@ def test_a_hold_that_the_server_ended_goes_on_only_when_pressed_again(page: Page
 
 
 def test_dragging_in_the_view_counts_as_holding(page: Page, server: PlayedServer) -> None:
+    open_screen(page, "drive")
     box = box_of(page.locator("rp-scene iframe"))
     page.mouse.move(box["x"] + 100, box["y"] + 100)
     page.mouse.down()
@@ -320,6 +337,7 @@ def test_the_view_costs_what_the_browser_can_draw(
 
 
 def test_a_gone_process_leaves_its_last_state_grey_and_aged(page: Page, server: PlayedServer) -> None:
+    open_screen(page, "engineer")
     server.gone = {"bridge": 3.2}
     expect(page.locator('.presence[data-process="bridge"]')).to_have_attribute("data-present", "false")
     note = page.locator("rp-telemetry .stale-note")
@@ -330,6 +348,8 @@ def test_a_gone_process_leaves_its_last_state_grey_and_aged(page: Page, server: 
 
 
 def test_a_lost_link_is_said_and_mended_by_itself(page: Page, server: PlayedServer) -> None:
+    open_screen(page, "engineer")
+    open_screen(page, "review")
     server.online = False
     server.sockets[-1].close()
     banner = page.locator("rp-link-banner")
@@ -349,7 +369,7 @@ def test_echoes_the_state_that_it_has_drawn(page: Page, server: PlayedServer) ->
 def test_says_what_it_waits_for_before_there_is_anything(tab: Page) -> None:
     server = PlayedServer(controller=None, bridge=None, gone={"controller": 9.0, "bridge": 9.0, "perception": 9.0})
     server.attach(tab)
-    tab.goto(f"{ORIGIN}/")
+    tab.goto(f"{ORIGIN}/#review")
     expect(tab.locator("#mode")).to_have_text("No state yet")
     expect(tab.locator("rp-queue > .empty")).to_contain_text("No pruning point in 12 images so far")
     expect(tab.locator("#start")).to_be_disabled()

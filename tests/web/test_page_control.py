@@ -9,7 +9,7 @@ from rolling_panda import reasons
 from rolling_panda.messages.page import Ping
 from rolling_panda.reasons import text_of
 from tests.support.page_host import STAND_STILL
-from tests.support.page_parts import held
+from tests.support.page_parts import held, open_screen
 from tests.support.played_page import until
 from tests.support.played_server import PlayedServer
 
@@ -22,10 +22,11 @@ def test_alone_there_is_nothing_to_see_of_it(page: Page, server: PlayedServer) -
     until(page, lambda: server.number > 5)
     expect(page.locator("rp-lease")).to_be_hidden()
     expect(page.locator("rp-robots")).to_be_hidden()
-    expect(page.locator("#stop small")).to_have_text("space bar")
+    expect(page.locator("#stop small")).to_have_text(["software stop", "space bar"])
 
 
 def test_control_is_taken_from_somebody_only_by_a_second_press(page: Page, server: PlayedServer) -> None:
+    open_screen(page, "drive")
     server.control = held("other", "Bob")
     control = page.locator("rp-lease")
     expect(control).to_contain_text("Bob holds control")

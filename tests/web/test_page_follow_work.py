@@ -11,6 +11,13 @@ from tests.support.played_page import box_of, until
 from tests.support.played_server import PlayedServer, controller, point
 
 pytestmark = pytest.mark.browser
+
+
+@pytest.fixture
+def screen() -> str:
+    return "review"
+
+
 MANY = 60
 
 
@@ -54,6 +61,7 @@ def at_work(server: PlayedServer, name: str, **changes: Any) -> None:
 
 def test_choosing_in_the_picture_or_the_3d_view_brings_the_list_there(page: Page, server: PlayedServer) -> None:
     assert not in_view(page, "p50")
+    page.locator("#swap").click()
     page.locator("rp-camera .mark").nth(49).locator(".target").click(force=True)
     is_shown(page, "p50")
     until(page, lambda: chosen(server) == [("p50", False)])

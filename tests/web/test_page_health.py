@@ -8,10 +8,16 @@ from playwright.sync_api import Page, expect
 
 from rolling_panda import reasons
 from rolling_panda.messages.supervision import CutReport, RefusalReport, SessionReport, StopState, VineReport
+from tests.support.page_parts import open_screen
 from tests.support.played_page import box_of, until
 from tests.support.played_server import PlayedServer, bridge, controller, point
 
 pytestmark = pytest.mark.browser
+
+
+@pytest.fixture
+def screen() -> str:
+    return "engineer"
 
 
 def shown(page: Page, chart: str) -> str:
@@ -32,8 +38,6 @@ def codes(page: Page) -> list[str]:
 def test_charts_show_what_was_and_stand_still_when_told_to(page: Page, server: PlayedServer) -> None:
     page.wait_for_timeout(1200)
     server.controller = controller("AUTO", position_error=0.0123)
-    page.locator('[data-opens="charts"]').click()
-    expect(page.locator("#drawer")).to_be_focused()
     until(page, lambda: shown(page, "position-error") == "12.3 mm")
     assert shown(page, "arm-speed") == "50 %" and shown(page, "wheel-speed") == "20 %"
     assert shown(page, "presence") == "4 of 4"
@@ -50,15 +54,11 @@ def test_charts_show_what_was_and_stand_still_when_told_to(page: Page, server: P
     box = box_of(canvas)
     page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 10)
     until(page, lambda: shown(page, "position-error") == "–")
-    expect(page.locator(".drawer-tools .hint")).to_have_text("2 min ago")
-    page.keyboard.press("Escape")
-    expect(page.locator("#drawer")).to_be_hidden()
-    expect(page.locator('[data-opens="charts"]')).to_be_focused()
+    expect(page.locator(".charts-panel .panel-head .hint")).to_have_text("2 min ago")
 
 
 def test_a_gap_is_a_gap_and_who_was_gone_is_seen(page: Page, server: PlayedServer) -> None:
     server.gone = {"perception": 5.0}
-    page.locator('[data-opens="charts"]').click()
     until(page, lambda: shown(page, "presence") == "3 of 4")
     server.gone = {"bridge": 5.0}
     until(page, lambda: shown(page, "position-error") == "–")
@@ -66,7 +66,7 @@ def test_a_gap_is_a_gap_and_who_was_gone_is_seen(page: Page, server: PlayedServe
 
 
 def test_alarms_come_worst_first_with_what_to_do_and_go(page: Page, server: PlayedServer) -> None:
-    expect(page.locator("#alarms .empty")).to_have_text("No alarms")
+    expect(page.locator("#alarms")).to_be_hidden()
     server.points = (point(1, "UNKNOWN"),)
     server.tell(server.page_points())
     server.bridge = bridge(cutter="jammed", real_time_factor=0.5)
@@ -76,10 +76,13 @@ def test_alarms_come_worst_first_with_what_to_do_and_go(page: Page, server: Play
     rows = page.locator("#alarms li strong")
     expect(rows.nth(1)).to_have_text("Fault: the ledger cannot be written")
     expect(page.locator("#alarms li .act").first).to_contain_text("free the blades")
-    expect(page.locator(".alarm-count")).to_have_text("4 alarms")
+    expect(page.locator("#alarms li:visible")).to_have_count(1)
+    page.locator("#more-alarms").click()
+    expect(page.locator("#alarms li:visible")).to_have_count(4)
+    page.locator("#more-alarms").click()
     server.bridge, server.controller, server.points = bridge(), controller(), ()
     server.tell(server.page_points())
-    expect(page.locator("#alarms .empty")).to_be_visible(timeout=5000)
+    expect(page.locator("#alarms")).to_be_hidden(timeout=5000)
     expect(page.locator("#alarms li")).to_have_count(0)
     server.controller = controller("PAUSED", reason="nothing was heard from them for 1 s")
     expect(rows).to_have_text(["Paused: nothing was heard from them for 1 s"])
@@ -118,6 +121,8 @@ def test_each_alarm_comes_with_its_state_and_goes(page: Page, server: PlayedServ
                 setattr(server, name, changes.get(name, getattr(usual, name)))
             server.tell(server.page_points())
             row = page.locator("#alarms li:not(.gone)")
+            if (more := page.locator('#more-alarms[aria-expanded="false"]')).is_visible():
+                more.click()
             expect(row.and_(page.locator(f'[data-code="{code}"]'))).to_be_visible()
             expect(row).to_have_count(1)
             expect(row).to_have_attribute("data-severity", reasons.CATALOGUE[code].severity)
@@ -139,7 +144,7 @@ def test_without_a_link_that_is_the_one_alarm_until_it_is_back(page: Page, serve
     expect(page.locator("#alarms li:not(.gone)")).to_have_attribute("data-code", "no_link", timeout=6000)
     expect(page.locator("rp-telemetry .stale-note")).to_contain_text("no link — last state")
     server.online, server.gone = True, {}
-    expect(page.locator("#alarms .empty")).to_be_visible(timeout=10_000)
+    expect(page.locator("#alarms")).to_be_hidden(timeout=10_000)
     expect(page.locator("rp-telemetry .stale-note")).to_be_hidden()
 
 
@@ -157,11 +162,11 @@ def test_what_the_page_itself_has_not_heard_is_no_alarm_of_a_process(page: Page,
     expect(page.locator("#alarms li").first).to_have_attribute("data-code", "server_silent", timeout=6000)
     assert set(page.evaluate("alarmed")) == {"server_silent"}
     server.silent, server.heard_s = False, 0.03
-    expect(page.locator("#alarms .empty")).to_be_visible(timeout=10_000)
+    expect(page.locator("#alarms")).to_be_hidden(timeout=10_000)
 
 
 def test_the_report_tells_cuts_by_outcome_and_vine_and_what_was_refused(page: Page, server: PlayedServer) -> None:
-    page.locator('[data-opens="report"]').click()
+    open_screen(page, "report")
     expect(page.locator("rp-report")).to_contain_text("Nothing has been cut yet.")
     cuts = [CutReport(cut_id="c1", point_id="p1", vine=1, spur=1, outcome="DONE", ended_at=2e9, seconds=3.0)]
     cuts.append(CutReport(cut_id="c2", point_id="p2", vine=1, spur=2, outcome="UNKNOWN", ended_at=2e9, seconds=5.0))
@@ -174,8 +179,8 @@ def test_the_report_tells_cuts_by_outcome_and_vine_and_what_was_refused(page: Pa
         refusals=(RefusalReport(at=2e9, user="Bob", asked="Start", reason=reasons.control_held("Ada")),),
         refusal_count=1,
     )
-    page.keyboard.press("Escape")
-    page.locator('[data-opens="report"]').click()
+    open_screen(page, "engineer")
+    open_screen(page, "report")
     expect(page.locator(".sums dd")).to_have_text(["1", "0", "1", "0", "4.0", "1", "1"])
     expect(page.locator("rp-report tbody tr")).to_have_count(4)
     expect(page.locator("rp-report")).to_contain_text("Ada holds control")
@@ -187,7 +192,7 @@ def test_a_cut_in_the_report_is_called_wrong_and_right_again(page: Page, server:
     cuts.append(CutReport(cut_id="c2", point_id="p2", vine=1, spur=2, outcome="UNKNOWN", ended_at=2e9, seconds=5.0))
     server.report = SessionReport(began_at=1.9e9, written_at=2e9, cuts=tuple(cuts), cut_count=2)
     server.answers["/api/points/p1/judge"] = (200, {"ok": True})
-    page.locator('[data-opens="report"]').click()
+    open_screen(page, "report")
     wrong = page.get_by_role("button", name="The cut at p1 was wrong")
     expect(page.locator(".judgement")).to_have_count(1)
     expect(wrong).to_have_attribute("aria-pressed", "false")

@@ -13,7 +13,7 @@ from rolling_panda import reasons
 from rolling_panda.messages import page as p
 from rolling_panda.resources import resource
 from server.api.page_files import minified
-from tests.support.page_parts import held
+from tests.support.page_parts import held, open_screen
 from tests.support.played_page import box_of, until
 from tests.support.played_server import PlayedServer, bridge, controller, point
 
@@ -135,6 +135,7 @@ def test_what_is_accepted_who_comes_and_a_whole_job_move_nothing_on_the_page(pag
 
 
 def test_the_queue_has_room_for_five_points_on_a_small_screen(page: Page, server: PlayedServer) -> None:
+    open_screen(page, "review")
     server.points = tuple(point(number, "PROPOSED", spur=number) for number in range(1, 12))
     server.tell(server.page_points())
     fifth, list_ = box_of(page.locator("rp-point").nth(4)), box_of(page.locator(".groups"))
@@ -226,13 +227,19 @@ def test_the_page_is_small_and_keeps_to_its_own_files() -> None:
             waiting += [(script.parent / name).resolve() for name in imported]
     assert sum(len(sent[script].encode()) for script in first) < 150_000, "what the page fetches before it is used"
     assert sum(text.stat().st_size for text in (folder / "text").glob("*.en.json")) < 90_000, "and the texts"
-    later = {"rp-charts.js", "rp-report.js", "rp-order.js", "rp-preview.js", "preview.js"}
-    later |= {"rp-robots.js", "lease-worker.js"}
+    opened = ["rp-review.js", "rp-drive.js", "rp-report.js", "rp-engineer.js", "rp-preview.js", "rp-robots.js"]
+    later = set[Path](folder / "components" / name for name in opened) | {folder / "js/control/lease-worker.js"}
+    waiting = list(later)
+    while waiting:
+        script = waiting.pop()
+        later.add(script)
+        imported = re.findall(r'^(?:import|export) [^;]*?"(\.[^"]+)";', sent[script], re.MULTILINE)
+        waiting += [found for name in imported if (found := (script.parent / name).resolve()) not in later]
     elsewhere = {"sign-in.js", "frame.js", "offscreen-framebuffer.js"}
     # The page to label pictures is a page of its own.
     elsewhere |= {script.name for script in scripts if script.parent.name == "label"}
     elsewhere |= {script.name for script in scripts if script.name.startswith(("rp-label-", "label."))}
-    assert {script.name for script in set(scripts) - first} - elsewhere == later, "what it fetches when opened"
+    assert {script.name for script in set(scripts) - first - later} == elsewhere, "what it fetches when opened"
     # Their indentation is not sent, so that none may lie within a text.
     assert [line for script in sent.values() for line in script.splitlines() if line.count("`") % 2] == []
     for file in [*scripts, *folder.rglob("*.css"), *folder.glob("*.html")]:

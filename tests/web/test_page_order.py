@@ -11,6 +11,13 @@ from tests.support.played_page import box_of, until
 from tests.support.played_server import PlayedServer, controller, point
 
 pytestmark = pytest.mark.browser
+
+
+@pytest.fixture
+def screen() -> str:
+    return "review"
+
+
 ALLOWED = ("MoveInQueue", "ResetOrder", "SetApproach")
 
 

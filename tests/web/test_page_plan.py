@@ -14,6 +14,13 @@ from tests.support.played_server import PlayedServer, controller, point
 from tests.support.points import rolled_out
 
 pytestmark = pytest.mark.browser
+
+
+@pytest.fixture
+def screen() -> str:
+    return "review"
+
+
 WAY = PointPlan(
     point_id="p1",
     revision=4,

@@ -12,6 +12,11 @@ from tests.support.played_server import PlayedServer
 pytestmark = pytest.mark.browser
 
 
+@pytest.fixture
+def screen() -> str:
+    return "review"
+
+
 def test_the_chosen_point_shows_its_picture_and_what_is_behind_the_cut(page: Page, server: PlayedServer) -> None:
     expect(page.locator("rp-point-details")).to_have_count(0)
     page.locator('[data-point-id="p1"]').click()

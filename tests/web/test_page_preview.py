@@ -14,6 +14,13 @@ from tests.support.played_server import PlayedServer, controller, point
 from tests.support.points import rolled_out
 
 pytestmark = pytest.mark.browser
+
+
+@pytest.fixture
+def screen() -> str:
+    return "review"
+
+
 ALLOWED = ("RequestPreview", "ApprovePreview", "RequirePreview", "MoveInQueue")
 
 
@@ -49,8 +56,10 @@ def moments(server: PlayedServer) -> list[float | None]:
 
 
 def test_a_preview_is_asked_for_of_all_or_of_the_chosen_point(page: Page, server: PlayedServer) -> None:
+    page.locator("#show-preview").click()
+    until(page, lambda: server.posted == [("/api/preview", {"point_id": ""})])
     page.locator("#preview").click()
-    until(page, lambda: ("/api/preview", {"point_id": ""}) in server.posted)
+    until(page, lambda: server.posted[1:] == [("/api/preview", {"point_id": ""})])
     expect(page.locator("#preview-one")).to_have_attribute("title", text_of(reasons.none_chosen()))
     page.locator('rp-point[data-point-id="p2"]').click()
     page.locator("#preview-one").click()
@@ -58,6 +67,8 @@ def test_a_preview_is_asked_for_of_all_or_of_the_chosen_point(page: Page, server
 
 
 def test_it_says_how_long_and_how_near_and_the_scrubber_shows_moments(page: Page, server: PlayedServer) -> None:
+    page.locator("#show-preview").click()
+    expect(page.locator("#preview")).to_be_visible()
     expect(page.locator(".preview-player")).to_be_hidden()
     told(server)
     words = page.locator(".preview-words")
@@ -79,6 +90,7 @@ def test_it_says_how_long_and_how_near_and_the_scrubber_shows_moments(page: Page
 
 def test_it_plays_to_its_end(page: Page, server: PlayedServer) -> None:
     told(server, duration_s=0.6)
+    page.locator("#show-preview").click()
     page.locator("#preview-play").click()
     until(page, lambda: moments(server)[-1:] == [0.6])
     shown = [moment for moment in moments(server) if moment is not None]
@@ -88,6 +100,7 @@ def test_it_plays_to_its_end(page: Page, server: PlayedServer) -> None:
 
 def test_it_is_approved_by_its_hash_and_what_changed_is_said_when_it_expires(page: Page, server: PlayedServer) -> None:
     told(server)
+    page.locator("#show-preview").click()
     page.locator("#approve-preview").click()
     until(page, lambda: ("/api/preview/approve", {"preview_hash": "ab" * 32}) in server.posted)
     told(server, phase="approved", approved_by="Ada")
@@ -98,6 +111,7 @@ def test_it_is_approved_by_its_hash_and_what_changed_is_said_when_it_expires(pag
 
 
 def test_where_it_is_required_start_says_what_is_missing(page: Page, server: PlayedServer) -> None:
+    page.locator("#show-preview").click()
     box = page.get_by_label("Before each cut")
     box.click()
     until(page, lambda: ("/api/preview/required", {"required": True}) in server.posted)
@@ -114,6 +128,7 @@ def test_where_it_is_required_start_says_what_is_missing(page: Page, server: Pla
 def test_who_may_not_operate_may_not_ask_or_approve(page: Page, server: PlayedServer) -> None:
     server.role = "viewer"
     told(server)
+    page.locator("#show-preview").click()
     for name in ("preview", "approve-preview"):
         expect(page.locator(f"#{name}")).to_have_attribute("title", text_of(reasons.viewer_only()))
     expect(page.locator("#require-preview")).to_be_disabled()

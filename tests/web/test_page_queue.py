@@ -12,6 +12,13 @@ from tests.support.played_page import until
 from tests.support.played_server import PlayedServer, point
 
 pytestmark = pytest.mark.browser
+
+
+@pytest.fixture
+def screen() -> str:
+    return "review"
+
+
 SEEN = {"revision": 4, "digest": "00000002" * 4}
 
 

@@ -12,6 +12,13 @@ from server.api.responses import outcome
 from tests.support.played_server import PlayedServer
 
 pytestmark = pytest.mark.browser
+
+
+@pytest.fixture
+def screen() -> str:
+    return "engineer"
+
+
 TEXTS = """async reasons => {
   const { reasonText } = await import("/js/state/reasons.js");
   return reasons.map(reason => reasonText(reason));
@@ -54,6 +61,7 @@ def test_a_refused_request_is_shown_with_the_page_s_own_words(server: PlayedServ
     """The answer has its reason as data; its English text is for scripts."""
     why = reasons.decision_unrecorded(reasons.wrong_mode("Home", "READY", "PROTECTIVE_STOP"))
     server.answers["/api/home"] = (409, outcome(False, why))
+    page.locator("#more").click()
     page.locator("#home").click()
     expect(page.locator(".toast")).to_contain_text("It was decided, but is not recorded: Home is possible in Ready; ")
     expect(page.locator(".toast")).to_contain_text("the mode is Protective stop")

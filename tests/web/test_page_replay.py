@@ -28,4 +28,4 @@ def test_a_recording_is_named_moved_in_and_tells_who_accepted_which(page: Page, 
     ]
     page.click("rp-replay summary")
     expect(page.locator("#replay-accepted li")).to_have_text(["p2: Ada · Accepted"])
-    expect(page.locator("rp-queue")).to_be_in_viewport()
+    expect(page.locator("rp-scene")).to_be_in_viewport()

@@ -13,6 +13,7 @@ from rolling_panda.messages import Reason
 from server.robots.summary import RobotSummary
 from tests.support.axe import axe, grave
 from tests.support.page_host import PlayedRequest, PlayedSocket, page_host
+from tests.support.page_parts import open_screen
 from tests.support.played_page import opened, until
 from tests.support.played_server import ORIGIN, PlayedServer, controller, page_file, point
 
@@ -108,20 +109,22 @@ def test_the_other_robot_is_seen_and_chosen_and_nothing_reaches_the_wrong_one(pa
     expect(second.locator(".robot-mode")).to_have_text("")
     expect(page.locator("rp-toasts")).to_contain_text("panda-2: Stopped: by Bob")
     # A hold ends with the choice of another robot, and that other robot is told nothing of it.
+    open_screen(page, "drive")
     page.locator("#teleop").click()
     page.keyboard.down("KeyH")
     until(page, lambda: one.holds()[-1:] == [True])
     until(page, lambda: len(samples(page)) > 4)
     second.click()
     expect(second).to_have_attribute("aria-current", "page")
-    expect(page.locator('[data-point-id="p2"]')).to_be_visible()
-    expect(page.locator('[data-point-id="p1"]')).to_have_count(0)
+    expect(page.locator('[data-cut="p2"]')).to_be_visible()
+    expect(page.locator('[data-cut="p1"]')).to_have_count(0)
     until(page, lambda: one.holds()[-1:] == [False])
     assert two.holds() == []
     until(page, lambda: len(samples(page)) > 0)
     assert min(samples(page)) >= 0, "the other robot's readings are no readings of this one"
     page.keyboard.up("KeyH")
     # What is pressed now is for the robot that is shown, except the stop.
+    open_screen(page, "review")
     page.locator('[data-point-id="p2"]').click()
     page.keyboard.press("KeyA")
     until(page, lambda: any(path == "/api/points/p2/accept" for path, _ in two.posted))

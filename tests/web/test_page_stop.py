@@ -8,6 +8,7 @@ from rolling_panda import reasons
 from rolling_panda.messages import page as p
 from rolling_panda.messages.supervision import StopRecord, StopState
 from rolling_panda.reasons import said, text_of
+from tests.support.page_parts import open_screen
 from tests.support.played_page import box_of, until
 from tests.support.played_server import PlayedServer, bridge, controller
 
@@ -62,6 +63,7 @@ def test_a_pressed_button_on_the_robot_comes_before_the_reset(page: Page, server
 @pytest.mark.parametrize("size", [(1280, 800), (1024, 768)])
 def test_no_notice_lies_over_the_field_for_the_reason(page: Page, server: PlayedServer, size: tuple[int, int]) -> None:
     page.set_viewport_size({"width": size[0], "height": size[1]})
+    open_screen(page, "drive")
     page.locator("#teleop").click()
     page.keyboard.down("h")
     until(page, lambda: server.holds()[-1:] == [True])

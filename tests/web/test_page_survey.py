@@ -6,6 +6,7 @@ from playwright.sync_api import Page, expect
 
 from rolling_panda import reasons
 from rolling_panda.reasons import text_of
+from tests.support.page_parts import open_screen
 from tests.support.played_page import until
 from tests.support.played_server import PlayedServer, controller
 
@@ -13,8 +14,10 @@ pytestmark = pytest.mark.browser
 
 
 def test_a_survey_goes_as_far_as_was_chosen(page: Page, server: PlayedServer) -> None:
+    server.points = ()
+    server.tell(server.page_points())
     server.controller = controller("READY", allowed={"Survey": None})
-    expect(page.locator("#survey")).to_be_enabled()
+    expect(page.locator(".next #survey")).to_be_enabled()
     page.locator("#survey").click()
     until(page, lambda: bool(server.posted))
     page.locator("#survey-distance").select_option("15")
@@ -26,6 +29,7 @@ def test_a_survey_goes_as_far_as_was_chosen(page: Page, server: PlayedServer) ->
 def test_a_place_that_needs_another_look_has_a_button_for_it_and_one_for_a_person_has_none(
     page: Page, server: PlayedServer
 ) -> None:
+    open_screen(page, "review")
     server.controller = controller("READY", allowed={"Survey": None})
     unclear, deciding = server.undecided_sites
     server.undecided_sites = (msgspec.structs.replace(unclear, position=(1.0, 0.8, 0.9)), deciding)
@@ -43,6 +47,7 @@ def test_a_place_that_needs_another_look_has_a_button_for_it_and_one_for_a_perso
 
 
 def test_an_unfamiliar_picture_is_told_to_the_operator(page: Page, server: PlayedServer) -> None:
+    open_screen(page, "review")
     (site, *_) = server.undecided_sites
     reason = reasons.picture_unfamiliar(2.4, 1.2)
     told = msgspec.structs.replace(site, reason=reason, needs="operator", vine=0, spur=0, position=None)

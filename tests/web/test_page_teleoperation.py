@@ -12,6 +12,13 @@ from tests.support.played_page import box_of, until
 from tests.support.played_server import PlayedServer, controller
 
 pytestmark = pytest.mark.browser
+
+
+@pytest.fixture
+def screen() -> str:
+    return "drive"
+
+
 GAMEPAD = """
 window.pad = { connected: true, index: 0, id: "Test pad", mapping: "standard",
   axes: [0, 0, 0, 0], buttons: Array.from({ length: 17 }, () => ({ value: 0, pressed: false })) };

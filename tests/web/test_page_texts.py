@@ -91,7 +91,10 @@ FAMILIES: dict[str, Sequence[str]] = {
     "teleop.${}": ("part", "axes"),
     "teleop.${}.${}": CHOICES,
     "teleop.${}.${}.hint": CHOICES,
-    "${}.title": ("charts", "report"),
+    "screen.${}": ("work", "review", "drive", "report", "engineer"),
+    "health.${}": ("robot", "camera"),
+    "bar.${}": ("preview", "reset"),
+    "bar.to_${}": ("review", "preview", "reset"),
     # What a message names.
     "name.${}": (
         *(event.value for event in Event),

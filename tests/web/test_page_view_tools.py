@@ -12,6 +12,11 @@ from tests.support.played_server import PlayedServer
 pytestmark = pytest.mark.browser
 
 
+@pytest.fixture
+def screen() -> str:
+    return "review"
+
+
 def presets(server: PlayedServer) -> list[str]:
     return [message.preset for message in server.said if isinstance(message, p.PlaceCamera)]
 

@@ -1,7 +1,8 @@
-// Panel with the alarms, errors first, each with what to do.
+// Banner with the alarms: the worst one with what to do and the button that does it; the others behind a press.
 
+import { COMMANDS, take, whyNotStep } from "../js/control/commands.js";
 import { clockWords } from "../js/state/format.js";
-import { link, now, pageState, points } from "../js/state/page-state.js";
+import { link, now, pageState, points, preview } from "../js/state/page-state.js";
 import { partsOf, reasonText, severityOf } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
 import { counted, text } from "../js/state/texts.js";
@@ -9,56 +10,82 @@ import { alarms } from "../js/views/alarms.js";
 import { element, setText } from "../js/views/dom.js";
 import { icon } from "../js/views/icons.js";
 
+/** @typedef {import("../js/control/commands.js").Step} Step */
+
 /** A cleared alarm stays for this time (ms), so that it can be read and the list does not flicker. */
 const LINGER_MS = 2000;
+/** What a step of the advice asks to press. @type {Readonly<Record<string, Step>>} */
+const PRESSES = Object.freeze({
+  press_reset: "reset",
+  acknowledge_resume: "Acknowledge",
+  acknowledge_arm: "Acknowledge",
+  press_resume: "Resume",
+  resume_home: "Resume",
+  press_start: "Start",
+  press_survey: "Survey",
+  survey_on: "Survey",
+  survey_on_or_start: "Survey",
+  press_home: "Home",
+  arm_and_home: "Arm",
+  accept_start: "review",
+  preview_start: "preview",
+  approve_start: "preview",
+});
 
 class RpAlarms extends HTMLElement {
+  /** @type {Map<string, ReturnType<typeof newRow>>} */
+  rows = new Map();
+  list = element("ul", { class: "alarm-list", attributes: { "aria-label": text("alarms.title") } });
+
   connectedCallback() {
     this.id = "alarms";
-    const count = element("span", { class: "alarm-count number" });
-    const list = element("ul", { class: "alarm-list", attributes: { tabindex: "0", "aria-label": text("alarms.title") } });
-    const live = element("div", { class: "live", attributes: { role: "log", "aria-live": "assertive" } }, list);
-    const empty = element("p", { class: "empty" }, element("span", { class: "calm" }, icon("present"), text("alarms.none")));
-    this.append(element("div", { class: "panel-head" }, element("h2", { text: text("alarms.title") }), count), live, empty);
-    /** @type {Map<string, { row: HTMLElement, text: Element, act: HTMLElement, seen: number }>} */
-    const rows = new Map();
-    drawOn([now, pageState, points, link], () => {
-      const found = alarms();
-      const at = performance.now();
-      for (const { reason, steps } of found) {
-        const known = rows.get(reason.code) ?? newRow(reason);
-        rows.set(reason.code, known);
-        known.seen = at;
-        const parts = partsOf(reason);
-        setText(known.text, parts.text);
-        setText(known.act, [parts.act, ...steps.map(reasonText)].filter(Boolean).map(sentence).join(" "));
-        known.act.dataset.steps = steps.map((step) => step.code).join(" ");
-      }
-      for (const [code, { row, seen }] of rows) {
-        // Its advice is hidden.
-        row.classList.toggle("gone", seen < at);
-        if (at - seen < LINGER_MS) continue;
-        row.remove();
-        rows.delete(code);
-      }
-      let previous = /** @type {Element|null} */ (null);
-      for (const { row } of [...rows.values()].sort((a, b) => rank(a.row) - rank(b.row))) {
-        if (row !== (previous ? previous.nextElementSibling : list.firstElementChild)) {
-          if (previous) previous.after(row);
-          else list.prepend(row);
-        }
-        previous = row;
-      }
-      empty.hidden = rows.size > 0;
-      this.dataset.worst = found[0] ? severityOf(found[0].reason) : "";
-      setText(count, rows.size > 0 ? counted("alarms.count", rows.size) : "");
+    const more = element("button", { id: "more-alarms", class: "quiet", attributes: { "aria-expanded": "false" } });
+    const live = element("div", { class: "live", attributes: { role: "log", "aria-live": "assertive" } }, this.list);
+    this.append(live, more);
+    more.addEventListener("click", () => {
+      more.setAttribute("aria-expanded", String(more.getAttribute("aria-expanded") !== "true"));
+      this.draw(more);
     });
+    drawOn([now, pageState, points, preview, link], () => this.draw(more));
+  }
+
+  /** @param {HTMLElement} more */
+  draw(more) {
+    const found = alarms();
+    const at = performance.now();
+    for (const { reason, steps } of found) {
+      const row = this.rows.get(reason.code) ?? newRow(reason);
+      this.rows.set(reason.code, row);
+      row.show(reason, steps, at);
+    }
+    for (const [code, { row, seen }] of this.rows) {
+      // Its advice is hidden.
+      row.classList.toggle("gone", seen() < at);
+      if (at - seen() < LINGER_MS) continue;
+      row.remove();
+      this.rows.delete(code);
+    }
+    const sorted = [...this.rows.values()].sort((a, b) => rank(a.row) - rank(b.row));
+    sorted.forEach(({ row }, at) => {
+      if (this.list.children[at] !== row) this.list.insertBefore(row, this.list.children[at] ?? null);
+    });
+    const first = sorted[0]?.row;
+    this.hidden = !first;
+    this.dataset.worst = first?.dataset.severity ?? "";
+    // Warnings that ask for nothing take no room from the view.
+    const quiet = sorted.every(({ row }) => row.dataset.severity !== "error" && row.dataset.asks === "");
+    const open = more.getAttribute("aria-expanded") === "true";
+    this.classList.toggle("quiet", quiet && !open);
+    for (const { row } of sorted) row.hidden = !open && (quiet || row !== first);
+    more.hidden = sorted.length < 2 && !quiet;
+    const words = quiet ? counted("alarms.warnings", sorted.length) : counted("alarms.more", sorted.length - 1);
+    setText(more, open ? text("alarms.fewer") : words);
   }
 }
 
 /** @param {HTMLElement} row */
 function rank(row) {
-  return Number(row.dataset.severity === "warning");
+  return Number(row.dataset.severity === "warning") + Number(row.dataset.asks === "") / 2;
 }
 
 /** @param {string} words */
@@ -72,13 +99,42 @@ function newRow(reason) {
   const words = element("strong");
   const act = element("span", { class: "act" });
   const since = element("time", { text: clockWords(Date.now() / 1000), attributes: { title: text("alarms.since") } });
+  const press = element("button", { class: "alarm-press", onclick: () => step && take(step) });
   const row = element(
     "li",
-    { data: { severity, code: reason.code } },
+    { data: { severity, code: reason.code, asks: "" } },
     icon(severity),
     element("span", { class: "alarm-words" }, words, act),
+    press,
     since,
   );
-  return { row, text: words, act, seen: 0 };
+  let seenAt = 0;
+  let step = /** @type {Step|undefined} */ (undefined);
+  return {
+    row,
+    seen: () => seenAt,
+    /**
+     * @param {import("../js/state/reasons.js").Reason} why
+     * @param {readonly import("../js/state/reasons.js").Reason[]} steps
+     * @param {number} at
+     */
+    show(why, steps, at) {
+      seenAt = at;
+      const parts = partsOf(why);
+      setText(words, parts.text);
+      setText(act, [parts.act, ...steps.map(reasonText)].filter(Boolean).map(sentence).join(" "));
+      act.dataset.steps = steps.map((each) => each.code).join(" ");
+      row.dataset.asks = act.dataset.steps;
+      step = steps.map((each) => PRESSES[each.code]).find((each) => each && !whyNotStep(each));
+      press.hidden = !step;
+      if (step) setText(press, labelOf(step));
+    },
+  };
+}
+
+/** @param {Step} step */
+function labelOf(step) {
+  if (step === "Acknowledge") return text("bar.checked");
+  return COMMANDS.some((each) => each === step) ? text(`command.${step}`) : text(`bar.to_${step}`);
 }
 customElements.define("rp-alarms", RpAlarms);

@@ -66,6 +66,7 @@ class RpInvite extends HTMLElement {
     });
     this.addEventListener("keydown", (event) => {
       if (event.key !== "Escape" || form.hidden) return;
+      event.stopPropagation();
       show(false);
       toggle.focus();
     });

@@ -8,7 +8,6 @@ import { drawOn } from "../js/state/signals.js";
 import { labelOf, text } from "../js/state/texts.js";
 import { dropDown, element, setText } from "../js/views/dom.js";
 import { icon } from "../js/views/icons.js";
-import { drawerButton } from "./rp-drawer.js";
 
 /** @typedef {import("../js/link/messages.js").PageEvent} PageEvent */
 
@@ -31,7 +30,7 @@ class RpLog extends HTMLElement {
     const live = element("div", { class: "live", attributes: { role: "log", "aria-live": "polite" } }, list);
     const empty = element("p", { class: "empty" });
     this.id = "log";
-    const tools = element("div", { class: "log-tools" }, words, from, least, drawerButton("report", text("report.title")));
+    const tools = element("div", { class: "log-tools" }, words, from, least);
     this.append(element("div", { class: "panel-head" }, element("h2", { text: text("log.title") }), tools), live, empty);
 
     // Follow the newest line until the operator scrolls up; a resize does not count.

@@ -1,10 +1,10 @@
-// The mode, its phase and its reason.
+// The mode with its phase.
 
 import { isLive, link, now, pageState } from "../js/state/page-state.js";
 import { reasonText } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
 import { text } from "../js/state/texts.js";
-import { element, setText } from "../js/views/dom.js";
+import { element, setAttribute, setText } from "../js/views/dom.js";
 import { setIcon } from "../js/views/icons.js";
 
 class RpMode extends HTMLElement {
@@ -14,8 +14,7 @@ class RpMode extends HTMLElement {
     const shape = element("span", { class: "shape" });
     const word = element("span", { class: "word" });
     const chip = element("span", { id: "mode", class: "chip mode", data: { mode: "" } }, shape, word);
-    const reason = element("span", { class: "mode-reason" });
-    this.append(chip, reason);
+    this.append(chip);
     drawOn([pageState, link, now], () => {
       const controller = pageState.get()?.controller ?? null;
       const mode = controller?.mode ?? "";
@@ -24,8 +23,7 @@ class RpMode extends HTMLElement {
       setIcon(shape, mode || "UNKNOWN");
       const phase = controller?.phase ? ` · ${text(`phase.${controller.phase}`)}` : "";
       setText(word, text(`mode.${mode || "none"}`) + phase);
-      setText(reason, reasonText(controller?.reason));
-      reason.title = reason.textContent ?? "";
+      setAttribute(chip, "title", reasonText(controller?.reason));
     });
   }
 }

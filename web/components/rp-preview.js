@@ -5,11 +5,13 @@ import { workOrder } from "../js/control/order.js";
 import {
   approvePreview,
   askPreview,
+  closePreview,
   cutAt,
   hasPreview,
   hidePreview,
   moment,
   playing,
+  previewOpen,
   requirePreview,
   showMoment,
   togglePlayback,
@@ -35,6 +37,8 @@ class RpPreview extends HTMLElement {
     const one = button("preview-one", text("preview.one"), () => void askPreview(selected.get()));
     const run = button("preview-play", text("preview.play"), togglePlayback);
     const close = button("preview-hide", text("preview.hide"), hidePreview);
+    const leave = button("close-preview", "×", closePreview);
+    leave.setAttribute("aria-label", text("preview.close"));
     const yes = button("approve-preview", text("preview.approve"), () => void approvePreview());
     const slider = element("input", {
       id: "preview-time",
@@ -50,7 +54,10 @@ class RpPreview extends HTMLElement {
       text("preview.required"),
     );
     const player = element("div", { class: "preview-player" }, run, slider, time, close, yes);
-    this.replaceChildren(element("div", { class: "preview-tools" }, all, one, label, words), player);
+    this.replaceChildren(element("div", { class: "preview-tools" }, all, one, label, leave, words), player);
+    drawOn([previewOpen], () => {
+      this.hidden = !previewOpen.get();
+    });
     slider.addEventListener("input", () => {
       playing.set(false);
       showMoment(Number(slider.value));

@@ -68,7 +68,7 @@ class RpQueue extends HTMLElement {
     this.append(
       head,
       document.createElement("rp-rule"),
-      orderOfWork(),
+      document.createElement("rp-order"),
       element("div", { class: "queue-tools" }, summary, acceptEvery(), addByHand()),
       list,
       empty,
@@ -246,13 +246,6 @@ class RpQueue extends HTMLElement {
       setPlacing(!placing.get());
     }
   }
-}
-
-/** A placeholder until the order is fetched, so that the first acceptance shifts no row. */
-function orderOfWork() {
-  const order = document.createElement("rp-order");
-  order.append(element("p", { class: "rule order-none", text: text("order.none_accepted") }));
-  return order;
 }
 
 function undoButton() {

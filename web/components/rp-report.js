@@ -5,6 +5,8 @@ import { judge } from "../js/control/decisions.js";
 import { reasonIn } from "../js/link/api.js";
 import { clockWords } from "../js/state/format.js";
 import { reasonText } from "../js/state/reasons.js";
+import { screen } from "../js/state/screens.js";
+import { drawOn } from "../js/state/signals.js";
 import { counted, labelOf, text } from "../js/state/texts.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
 
@@ -14,7 +16,7 @@ import { element, setEnabled, setText } from "../js/views/dom.js";
 /** Refresh period while open (ms); the controller publishes it every 5 s. */
 const AGAIN_MS = 5000;
 
-export class RpReport extends HTMLElement {
+class RpReport extends HTMLElement {
   constructor() {
     super();
     this.timer = 0;
@@ -24,23 +26,23 @@ export class RpReport extends HTMLElement {
     this.cuts = table("cuts", ["ended", "point", "vine", "outcome", "seconds", "user", "judgement"]);
     this.refusals = table("refusals", ["when", "who", "asked", "why"]);
     this.control = table("control", ["when", "who", "what"]);
-    /** @type {Node[]} */
-    this.tools = [download("api/report", "report.json", "JSON"), download("api/report.csv", "cuts.csv", "CSV")];
   }
 
   connectedCallback() {
-    if (this.childElementCount > 0) return;
     this.tabIndex = 0;
     this.setAttribute("role", "group");
     this.setAttribute("aria-label", text("report.title"));
     const tables = [this.vines, this.cuts, this.refusals, this.control];
-    this.append(this.words, this.sums, ...tables.map((each) => each.box));
+    const tools = [download("api/report", "report.json", "JSON"), download("api/report.csv", "cuts.csv", "CSV")];
+    const head = element("div", { class: "report-head" }, element("h2", { text: text("report.title") }), ...tools);
+    this.replaceChildren(head, this.words, this.sums, ...tables.map((each) => each.box));
+    drawOn([screen], () => this.follow());
   }
 
-  /** @param {boolean} open */
-  open(open) {
+  /** Fetch while the screen is open. */
+  follow() {
     window.clearInterval(this.timer);
-    if (!open) return;
+    if (screen.get() !== "report") return;
     void this.fetch();
     this.timer = window.setInterval(() => void this.fetch(), AGAIN_MS);
   }

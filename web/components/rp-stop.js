@@ -23,7 +23,8 @@ class RpStop extends HTMLElement {
         "span",
         { class: "stop-words" },
         label,
-        element("small", { text: text(multiRobot ? "stop.all_key" : "stop.key") }),
+        element("small", { text: text(multiRobot ? "stop.all" : "stop.name") }),
+        element("small", { class: "keyboard", text: text("stop.key") }),
       ),
     );
     // On pointerdown, so that a finger that slides off has still stopped the robot.

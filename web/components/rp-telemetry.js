@@ -5,7 +5,6 @@ import { drawOn } from "../js/state/signals.js";
 import { counted, text } from "../js/state/texts.js";
 import { element, panelHead, setText, svg } from "../js/views/dom.js";
 import { READINGS, beyondLimit } from "../js/views/readings.js";
-import { drawerButton } from "./rp-drawer.js";
 
 /** @typedef {import("../js/views/readings.js").Reading} Reading */
 
@@ -82,7 +81,7 @@ const SHOWN = READINGS.filter((reading) => reading.place !== "chart");
 
 class RpTelemetry extends HTMLElement {
   connectedCallback() {
-    const { head, note } = panelHead(text("telemetry.title"), drawerButton("charts", text("telemetry.charts")));
+    const { head, note } = panelHead(text("telemetry.title"));
     const title = element("summary");
     const engineers = element("details", { class: "engineers" }, title);
     this.append(head);

@@ -5,6 +5,7 @@ import { placing, setPlacing } from "../js/control/placing.js";
 import {
   LAYERS,
   PRESETS,
+  large,
   layers,
   measured,
   measuring,
@@ -17,6 +18,22 @@ import { reason } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
 import { labelOf, text } from "../js/state/texts.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
+import { icon } from "../js/views/icons.js";
+
+/** Camera and 3-D view change places by a press of the smaller one. */
+class RpSwap extends HTMLElement {
+  connectedCallback() {
+    const button = element("button", { id: "swap", onclick: () => large.set(large.get() === "scene" ? "camera" : "scene") }, icon("swap"));
+    this.append(button);
+    drawOn([large], () => {
+      if (this.parentElement) this.parentElement.dataset.large = large.get();
+      const words = text(large.get() === "scene" ? "stage.camera_large" : "stage.scene_large");
+      button.title = words;
+      button.setAttribute("aria-label", words);
+    });
+  }
+}
+customElements.define("rp-swap", RpSwap);
 
 class RpPlacing extends HTMLElement {
   connectedCallback() {

@@ -1,26 +1,22 @@
 // Entry point: defines the components, opens the link, starts clock and keys.
 
 import "../components/rp-alarms.js";
+import "../components/rp-bar.js";
 import "../components/rp-camera.js";
-import "../components/rp-commands.js";
-import "../components/rp-drawer.js";
-import "../components/rp-invite.js";
+import "../components/rp-health.js";
 import "../components/rp-lease.js";
 import "../components/rp-link-banner.js";
-import "../components/rp-log.js";
 import "../components/rp-mode.js";
-import "../components/rp-queue.js";
+import "../components/rp-person.js";
 import "../components/rp-replay.js";
-import "../components/rp-rule.js";
 import "../components/rp-scene.js";
-import "../components/rp-status-bar.js";
+import "../components/rp-screens.js";
 import "../components/rp-stop-banner.js";
 import "../components/rp-stop.js";
-import "../components/rp-telemetry.js";
-import "../components/rp-teleoperation.js";
 import "../components/rp-toasts.js";
 import "../components/rp-view-tools.js";
-import { isAccepted } from "./control/decisions.js";
+import "../components/rp-vines.js";
+import "../components/rp-work.js";
 import { listenForDriveKeys, watchGamepad } from "./control/driving.js";
 import { followWork } from "./control/follow-work.js";
 import { renewLease } from "./control/lease.js";
@@ -29,7 +25,8 @@ import { listenForSpace, multiRobot } from "./control/stop.js";
 import { initTeleoperation } from "./control/teleoperation.js";
 import { initViewTools } from "./control/view-tools.js";
 import { socket } from "./link/socket.js";
-import { now, points } from "./state/page-state.js";
+import { now } from "./state/page-state.js";
+import { initScreens } from "./state/screens.js";
 import { explainDisabled } from "./views/disabled-reasons.js";
 import { fillTexts } from "./views/dom.js";
 import { recordHistory } from "./views/history.js";
@@ -37,6 +34,7 @@ import { recordHistory } from "./views/history.js";
 fillTexts(document);
 explainDisabled(document);
 listenForSpace(window);
+initScreens();
 initTeleoperation();
 listenForDriveKeys(window);
 watchGamepad();
@@ -47,18 +45,6 @@ initViewTools();
 followWork();
 window.setInterval(() => now.set(performance.now()), 250);
 socket.open();
-// Order of work and preview are fetched with the first accepted point, and again if that fails.
-let coming = false;
-const wait = points.subscribe(async (page) => {
-  if (coming || !page?.points.some((row) => isAccepted(row))) return;
-  coming = true;
-  try {
-    await Promise.all([import("../components/rp-order.js"), import("../components/rp-preview.js")]);
-    wait();
-  } catch {
-    coming = false;
-  }
-});
 if (multiRobot) {
   // Shown before it is fetched, so that nothing shifts.
   document.querySelector("rp-robots")?.removeAttribute("hidden");

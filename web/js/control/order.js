@@ -1,6 +1,7 @@
 // The order of work: its points, who set it, and changing it.
 
 import { ask } from "../link/api.js";
+import { durationWords } from "../state/format.js";
 import { pageState, points } from "../state/page-state.js";
 import { counted, text } from "../state/texts.js";
 import { countOf, whyNot, whyNotPoint } from "./allowed.js";
@@ -28,12 +29,6 @@ export function orderWords() {
   const long = plan?.state === "valid" ? `, ${durationWords(plan.duration_s)}` : "";
   const whose = orderedBy() ? text("order.by", { user: orderedBy() }) : text("order.by_plan");
   return `${counted("order.points", rows.length)}, ${whose}${long}${more}`;
-}
-
-/** @param {number} seconds */
-function durationWords(seconds) {
-  if (seconds < 120) return `${Math.round(seconds)} s`;
-  return `${Math.floor(seconds / 60)} min ${Math.round(seconds % 60)} s`;
 }
 
 /** Time that a planned cut takes; empty until it is rolled out. @param {PointPlan} plan */

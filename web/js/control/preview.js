@@ -16,6 +16,8 @@ const TELL_MS = 66;
 /** Moment of the playback (s); null while the ghost is hidden. */
 export const moment = signal(/** @type {number|null} */ (null));
 export const playing = signal(false);
+/** Does the preview lie over the view? */
+export const previewOpen = signal(false);
 let startedAt = 0;
 let toldAt = 0;
 
@@ -45,6 +47,17 @@ export function askPreview(pointId) {
 
 export function approvePreview() {
   return ask(text("preview.approving"), "api/preview/approve", { preview_hash: preview.get()?.preview_hash ?? "" });
+}
+
+/** Lay the preview over the view, and ask for one where there is none. */
+export function openPreview() {
+  previewOpen.set(true);
+  if (!hasPreview() && !whyNoPreview()) void askPreview("");
+}
+
+export function closePreview() {
+  hidePreview();
+  previewOpen.set(false);
 }
 
 /** @param {boolean} required */

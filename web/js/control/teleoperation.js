@@ -3,6 +3,7 @@
 import { socket } from "../link/socket.js";
 import { pageState, showToast } from "../state/page-state.js";
 import { reason, reasonText } from "../state/reasons.js";
+import { screen } from "../state/screens.js";
 import { signal } from "../state/signals.js";
 import { whyNoTeleoperation } from "./allowed.js";
 import { isTyping } from "./stop.js";
@@ -144,6 +145,10 @@ export function initTeleoperation() {
   // After a mode without teleoperation the switch has to be pressed again.
   pageState.subscribe(() => {
     if (teleoperating.get() && whyNoTeleoperation()) setTeleoperating(false);
+  });
+  // No other screen shows what moves.
+  screen.subscribe((name) => {
+    if (name !== "drive") setTeleoperating(false);
   });
   document.addEventListener("visibilitychange", () => {
     if (document.hidden) hold.releaseAll();

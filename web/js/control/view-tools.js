@@ -21,6 +21,8 @@ const STORAGE_KEY = "layers";
 
 /** @type {import("../state/signals.js").Signal<ReadonlySet<Layer>>} */
 export const layers = signal(storedLayers());
+/** Which of the two views is the large one. */
+export const large = signal(/** @type {"scene"|"camera"} */ ("scene"));
 export const measuring = signal(false);
 /** The last measurement. */
 export const measured = signal(/** @type {import("../link/messages.js").Measured|null} */ (null));

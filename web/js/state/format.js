@@ -19,6 +19,12 @@ export function ageWords(seconds) {
   return `${Math.floor(seconds / 3600)} h`;
 }
 
+/** @param {number} seconds */
+export function durationWords(seconds) {
+  if (seconds < 120) return `${Math.round(seconds)} s`;
+  return `${Math.floor(seconds / 60)} min ${Math.round(seconds % 60)} s`;
+}
+
 /** @param {number} metres */
 export function millimetres(metres) {
   const value = metres * 1000;

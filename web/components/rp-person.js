@@ -1,0 +1,36 @@
+// Who is signed in, and behind that name: inviting somebody, and signing out.
+
+import { post } from "../js/link/api.js";
+import { pageState, say } from "../js/state/page-state.js";
+import { reasonText } from "../js/state/reasons.js";
+import { drawOn } from "../js/state/signals.js";
+import { counted, labelOf, text } from "../js/state/texts.js";
+import { element, setAttribute, setText } from "../js/views/dom.js";
+import { icon } from "../js/views/icons.js";
+import { menu } from "../js/views/menu.js";
+import "./rp-invite.js";
+
+class RpPerson extends HTMLElement {
+  connectedCallback() {
+    const name = element("span", { class: "user-name" });
+    const open = element("button", { id: "person", class: "quiet" }, icon("person"), name);
+    const role = element("p", { class: "user-role" });
+    const leave = element("button", { id: "sign-out", text: text("person.leave"), onclick: () => void signOut() });
+    const list = element("div", { id: "person-menu", class: "menu" }, role, document.createElement("rp-invite"), leave);
+    this.append(open, list);
+    menu(open, list);
+    drawOn([pageState], () => {
+      const state = pageState.get();
+      setText(name, state?.user ?? "");
+      setAttribute(open, "aria-label", text("person.open", { user: state?.user ?? "" }));
+      setText(role, state ? `${state.user} · ${labelOf(state.role)} · ${counted("person.pages", state.viewers)}` : "");
+    });
+  }
+}
+
+async function signOut() {
+  const answer = await post("api/sign-out");
+  if (answer.ok) location.replace("/");
+  else say("error", text("refused", { what: text("person.leave"), why: reasonText(answer.why) }));
+}
+customElements.define("rp-person", RpPerson);

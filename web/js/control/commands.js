@@ -1,0 +1,43 @@
+// The robot's commands that have a button, and where else the next step leads.
+
+import { ask } from "../link/api.js";
+import { openScreen } from "../state/screens.js";
+import { signal } from "../state/signals.js";
+import { text } from "../state/texts.js";
+import { whyNot } from "./allowed.js";
+import { openPreview } from "./preview.js";
+
+/** @typedef {"Arm"|"Survey"|"Start"|"Pause"|"Resume"|"Home"|"Acknowledge"} CommandName */
+/** @typedef {CommandName|"review"|"preview"|"reset"} Step */
+
+/** @type {readonly CommandName[]} */
+export const COMMANDS = Object.freeze(["Arm", "Survey", "Start", "Pause", "Resume", "Home", "Acknowledge"]);
+/** How far the next survey goes (m). */
+export const surveyDistance = signal(4);
+
+/** @param {Step} step @returns {step is CommandName} */
+export function isCommand(step) {
+  return COMMANDS.some((each) => each === step);
+}
+
+/** Why a step is not possible now. @param {Step} step */
+export function whyNotStep(step) {
+  return isCommand(step) ? whyNot(step) : null;
+}
+
+/** @param {Step} step */
+export function take(step) {
+  switch (step) {
+    case "review":
+      openScreen("review");
+      break;
+    case "preview":
+      openPreview();
+      break;
+    case "reset":
+      document.getElementById("reset-reason")?.focus();
+      break;
+    default:
+      void ask(text(`command.${step}`), `api/${step.toLowerCase()}`, step === "Survey" ? { distance: surveyDistance.get() } : {});
+  }
+}

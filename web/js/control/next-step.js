@@ -1,0 +1,47 @@
+// The next step of the work: what the large button at the bottom does now, and what waits for a person.
+
+import { pageState, points, preview } from "../state/page-state.js";
+import { screen } from "../state/screens.js";
+import { countOf } from "./allowed.js";
+
+/** @typedef {import("./commands.js").Step} Step */
+
+/** @returns {Step|""} Empty for a recording. */
+export function nextStep() {
+  const state = pageState.get();
+  if (state?.replay) return "";
+  switch (state?.controller?.mode) {
+    case "READY":
+      return whenReady(state.controller.interrupted === "survey");
+    case "AUTO":
+    case "TELEOP":
+      return "Pause";
+    case "PAUSED":
+      return "Resume";
+    case "PROTECTIVE_STOP":
+    case "FAULT":
+      return "Acknowledge";
+    case "ESTOP_LATCHED":
+      return "reset";
+    default:
+      return "Arm";
+  }
+}
+
+/**
+ * @param {boolean} surveying Was a survey interrupted?
+ * @returns {Step}
+ */
+function whenReady(surveying) {
+  if (surveying) return "Survey";
+  const told = preview.get();
+  if (countOf("ACCEPTED") > 0) return told?.required && told.phase !== "approved" ? "preview" : "Start";
+  if (countOf("PROPOSED") === 0) return "Survey";
+  return screen.get() === "review" ? "Start" : "review";
+}
+
+/** How many points and places wait for a decision. */
+export function waitingForPerson() {
+  const places = points.get()?.undecided_sites.filter((site) => site.needs === "operator").length ?? 0;
+  return countOf("PROPOSED") + countOf("UNKNOWN") + places;
+}

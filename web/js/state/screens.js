@@ -1,0 +1,33 @@
+// The screens of the page, one for each job. The hash of the address names the open one.
+
+import { pageState } from "./page-state.js";
+import { signal } from "./signals.js";
+
+/** @typedef {"work"|"review"|"drive"|"report"|"engineer"} ScreenName */
+
+/** @type {readonly ScreenName[]} */
+export const SCREENS = Object.freeze(["work", "review", "drive", "report", "engineer"]);
+/** The open screen. */
+export const screen = signal(named() ?? "work");
+
+/** @returns {ScreenName|undefined} The screen that the address names. */
+function named() {
+  return SCREENS.find((each) => `#${each}` === location.hash);
+}
+
+/** @param {ScreenName} name */
+export function openScreen(name) {
+  if (name !== screen.get()) location.hash = name;
+  screen.set(name);
+}
+
+/** Follow the address. Where it names no screen, the robot's first state says which opens. */
+export function initScreens() {
+  window.addEventListener("hashchange", () => screen.set(named() ?? "work"));
+  if (named()) return;
+  const wait = pageState.subscribe((state) => {
+    if (!state?.controller) return;
+    wait();
+    if (state.controller.mode === "TELEOP" && !named()) location.replace("#drive");
+  });
+}
