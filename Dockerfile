@@ -41,7 +41,7 @@ FROM ${BASE_IMAGE}
 # choice, as with all that comes with the base.
 # hadolint ignore=DL3008
 RUN apt-get update \
-    && apt-get install --yes --no-install-recommends libgomp1 \
+    && apt-get install --yes --no-install-recommends libgomp1 libusb-1.0-0 \
     && rm -rf /var/lib/apt/lists/*
 # Which state of the source this is, told at /version:  --build-arg REVISION=$(git rev-parse HEAD)
 ARG REVISION=

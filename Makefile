@@ -23,6 +23,15 @@ help:
 	@echo "make materials  the bill of materials, CycloneDX, as build/materials.cdx.json"
 	@echo "make clean   remove the virtual environment and caches"
 
+# A system library that a Python package needs but does not bring: $(call library,FILE,PACKAGE,WHO needs).
+library = $(BIN)/python -c 'import ctypes; ctypes.CDLL("$(1)")' 2>/dev/null || \
+	if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+		echo "installing $(2), which $(3)"; apt-get update -qq; \
+		DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $(2) >/dev/null; \
+	else \
+		echo "$(2) is not installed, and $(3) it: sudo apt-get install $(2)"; exit 1; \
+	fi
+
 demo: $(VENV)/.project
 	@exec $(BIN)/rolling-panda demo $(ARGS)
 
@@ -143,6 +152,7 @@ $(VENV)/.locked: requirements.lock
 drivers: $(VENV)/.drivers
 $(VENV)/.drivers: $(VENV)/.project requirements-real.lock
 	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-real.lock
+	@$(call library,libusb-1.0.so.0,libusb-1.0-0,librealsense needs)
 	@touch $@
 
 # PyTorch's build without CUDA, which is on PyTorch's own package index: give that one to pip (PIP_EXTRA_INDEX_URL).
@@ -153,13 +163,7 @@ $(VENV)/.training: $(VENV)/.project requirements-training.lock
 
 # The control code becomes machine code when it is first imported: better here than at the first start.
 $(VENV)/.project: $(VENV)/.locked pyproject.toml
-	@$(BIN)/python -c 'import ctypes; ctypes.CDLL("libgomp.so.1")' 2>/dev/null || \
-	if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
-		echo "installing libgomp1, which Pinocchio needs"; apt-get update -qq; \
-		DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends libgomp1 >/dev/null; \
-	else \
-		echo "libgomp1 is not installed, and Pinocchio needs it: sudo apt-get install libgomp1"; exit 1; \
-	fi
+	@$(call library,libgomp.so.1,libgomp1,Pinocchio needs)
 	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	$(BIN)/python -c 'import controller.core'
 	@touch $@
