@@ -176,7 +176,6 @@ class WorkConfig(Struct, frozen=True, forbid_unknown_fields=True):
         close_up_speed: Largest speed of the tool at the close-up before a cut (m/s).
         close_up_from: Distance of the tool from the cut at the close-up after it (m).
         close_up_timeout_s: Time limit of a close-up (s).
-        moved_tolerance: A point that moved further than this after its acceptance is not cut (m).
         search_steps: Iterations of the posture search in 10 ms, distributed over the control periods.
     """
 
@@ -203,7 +202,6 @@ class WorkConfig(Struct, frozen=True, forbid_unknown_fields=True):
     close_up_speed: Annotated[float, at_most(0.5)] = 0.25
     close_up_from: Annotated[float, at_most(0.5)] = 0.15
     close_up_timeout_s: Annotated[float, at_most(20.0)] = 8.0
-    moved_tolerance: Annotated[float, at_most(0.005)] = 0.005
     search_steps: Annotated[int, Meta(ge=1, le=200)] = 10
 
 

@@ -148,7 +148,8 @@ class CloseUpConfig(Struct, frozen=True, forbid_unknown_fields=True):
         max_distance: Largest distance of the camera (m).
         half_window: Half the side of the image window around the point (m).
         probe_distance: The cane is standing when it continues this far past the cut (m).
-        max_lateral_offset: Largest distance of the cane's axis from the point (m).
+        max_lateral_offset: Largest distance of the cane's axis from the point, beyond the shift of the picture (m).
+        sure_offset: Where the surroundings do not tell the cane, its axis must be nearer to the point than this (m).
         max_end_gap: Largest distance along the cane between its end and the point (m).
         min_alignment: Smallest cosine of the angle between the cane and the point's tangent.
         max_node_shift: Largest shift of the last kept node along the cane (m).
@@ -160,6 +161,7 @@ class CloseUpConfig(Struct, frozen=True, forbid_unknown_fields=True):
     half_window: Positive = 0.09
     probe_distance: Positive = 0.02
     max_lateral_offset: Positive = 0.012
+    sure_offset: Positive = 0.005
     max_end_gap: Positive = 0.02
     min_alignment: Positive = 0.85
     max_node_shift: Positive = 0.008

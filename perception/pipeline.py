@@ -24,7 +24,7 @@ from perception.segmentation.network_segmenter import NetworkSegmenter
 from perception.segmentation.segmenter import Segmenter
 from perception.skeleton.topology import perceive_plant
 from perception.tracking.camera_rays import CameraRays, Ray
-from perception.tracking.close_up import check_close_up, failed_check
+from perception.tracking.close_up import AROUND, check_close_up, failed_check
 from perception.tracking.retained_canes import RetainedCanes
 from perception.tracking.spur_pictures import SpurPictures
 from perception.tracking.tracker import Proposal, Tracker, TrackerUpdate
@@ -199,7 +199,8 @@ class Perception:
             return failed_check(frame, reasons.point_unknown_to_perception())
         view = decode_frame(frame, self._model)
         try:
-            check = check_close_up(view, self.segmenter, point, frame.number, self._config)
+            known = self.plant_map.around(np.array(point.position), AROUND)
+            check = check_close_up(view, self.segmenter, point, frame.number, self._config, known)
         except UnusablePictureError as error:
             return failed_check(frame, error.reason)
         if check.position is not None and check.tangent is not None:

@@ -1864,6 +1864,16 @@ def cane_end_unclear() -> None:
 
 
 @_reason("info", "")
+def which_cane_unclear(distance_mm: float) -> None:
+    """A cane stands {distance_mm:.0f} mm beside the place; what is around it does not tell whether it is the one."""
+
+
+@_reason("info", "")
+def node_unseen_in_shifted_picture(distance_mm: float) -> None:
+    """The picture is shifted by {distance_mm:.0f} mm, and the node before the cut was not seen."""
+
+
+@_reason("info", "")
 def node_near_cut(distance_mm: float) -> None:
     """A node is seen {distance_mm:.0f} mm from the cut."""
 
@@ -2137,8 +2147,23 @@ def no_longer_reported() -> None:
 
 
 @_reason("warning", "")
-def moved_after_acceptance(distance_mm: float) -> None:
-    """It moved by {distance_mm:.0f} mm after it was accepted."""
+def moved_over_restart(distance_mm: float) -> None:
+    """It is {distance_mm:.0f} mm from where it was accepted, before perception or the controller started again."""
+
+
+@_reason("warning", "")
+def other_cane() -> None:
+    """It is now a cut of another cane, or another kind of cut."""
+
+
+@_reason("warning", "")
+def other_nodes_kept(before: int, now: int) -> None:
+    """It left {before} nodes when it was accepted, and leaves {now} now."""
+
+
+@_reason("info", "")
+def seen_elsewhere(distance_mm: float) -> None:
+    """The same cane is now seen {distance_mm:.0f} mm from where it was accepted."""
 
 
 @_reason("warning", "")
@@ -2455,9 +2480,9 @@ def unseen_in_close_up(why: Reason) -> None:
     """The close-up did not show it: {why}."""
 
 
-@_reason("warning", "accept it again")
-def moved_in_close_up(distance_mm: float) -> None:
-    """It moved by {distance_mm:.0f} mm in the close-up."""
+@_reason("info", "")
+def cut_where_seen(point: str, distance_mm: float) -> None:
+    """{point} is cut {distance_mm:.0f} mm from where it was accepted: the close-up sees the same cane there."""
 
 
 # Planning

@@ -18,9 +18,10 @@ from controller.work.close_up import not_as_accepted
 from controller.work.point_queue import Ticket
 from controller.work.posture_search import cut_poses
 from perception.config import PerceptionConfig
+from perception.plant.map import PlantMap
 from perception.segmentation.frame import decode_frame
 from perception.segmentation.segmenter import Segmenter
-from perception.tracking.close_up import check_close_up
+from perception.tracking.close_up import AROUND, check_close_up
 from rolling_panda import messages as m
 from rolling_panda.errors import InputError
 from rolling_panda.messages.perception import CloseUpResult
@@ -53,8 +54,16 @@ class Looks:
 class CloseCamera:
     """Looks at a row from near, with all errors of the camera on."""
 
-    def __init__(self, camera: Camera, segmenter: Segmenter, config: PerceptionConfig, model: RobotModel) -> None:
-        """Bind the camera of a row; `config` as perception has it, with the segmenter's width bias."""
+    def __init__(
+        self,
+        camera: Camera,
+        segmenter: Segmenter,
+        config: PerceptionConfig,
+        model: RobotModel,
+        known: PlantMap | None = None,
+    ) -> None:
+        """Bind the camera of a row; `config` and `known` as perception has them after a survey."""
+        self._known = known or PlantMap()
         self._camera, self._segmenter, self._config, self._model = camera, segmenter, config, model
         self._base, self._position = survey_place()
         self._taken = _FIRST
@@ -65,7 +74,8 @@ class CloseCamera:
         image = self._camera.render(row, T_odom_camera, self._taken)
         frame = camera_frame(image, self._camera, self._base, self._position, self._taken)
         view = replace(decode_frame(frame, self._model), R=T_odom_camera[:3, :3], t=T_odom_camera[:3, 3])
-        return check_close_up(view, self._segmenter, point, self._taken, self._config)
+        known = self._known.around(np.array(point.position), AROUND)
+        return check_close_up(view, self._segmenter, point, self._taken, self._config, known)
 
     @property
     def T_tool_camera(self) -> Array:
@@ -98,7 +108,7 @@ def look_again(points: Sequence[m.PruningPoint], row: Row, eye: CloseCamera, opi
         seen = eye.look(row, T_odom_camera, point)
         if seen.finding != "seen":
             seen = eye.look(row, T_odom_camera, point)
-        why = not_as_accepted(seen, ticket, config.work.moved_tolerance)
+        why = not_as_accepted(seen, ticket)
         if why or seen.position is None or seen.tangent is None:
             (into.right_voided if surveyed.right else into.wrong_voided).append("" if why is None else why.code)
             continue

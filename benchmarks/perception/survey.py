@@ -118,7 +118,7 @@ def survey_row(
             view = decode_frame(camera_frame(image, camera, base, position, 0), model)
             save_failure(gallery, verdict, point, row, camera, place, perception.segmenter.segment(view), image.color)
     if looks is not None:
-        eye = CloseCamera(camera, perception.segmenter, perception.config, model)
+        eye = CloseCamera(camera, perception.segmenter, perception.config, model, perception.plant_map)
         look_again(points, row, eye, opinion, looks)
     into.points += judged
     into.undecided_sites += left_open

@@ -7,8 +7,6 @@ both report an intact cane, it is cut once more. If they contradict each other, 
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
 from controller.config import WorkConfig
 from controller.motion.follower import Measured
 from controller.motion.tool_motion import ToolMotion
@@ -198,13 +196,12 @@ class PostCutCheck:
 _BASE_NEAR = 0.1
 
 
-def not_as_accepted(close_up: CloseUpResult, ticket: Ticket | None, tolerance: float) -> Reason | None:
-    """Reason why a point is not cut after its close-up; None if it is.
+def not_as_accepted(close_up: CloseUpResult, ticket: Ticket | None) -> Reason | None:
+    """Reason why a point is not cut after its close-up; None if it is, wherever the close-up has found its cane.
 
     Args:
         close_up: Result of the close-up.
         ticket: Ticket of the point.
-        tolerance: Largest displacement since the acceptance (m).
     """
     if ticket is None or ticket.accepted is None:
         return reasons.not_accepted_any_more()
@@ -214,9 +211,6 @@ def not_as_accepted(close_up: CloseUpResult, ticket: Ticket | None, tolerance: f
         return reasons.changed_in_close_up(_why(close_up))
     if close_up.finding == "unseen" or close_up.position is None:
         return reasons.unseen_in_close_up(_why(close_up))
-    moved = float(np.linalg.norm(np.subtract(close_up.position, ticket.accepted.position)))
-    if moved > tolerance:
-        return reasons.moved_in_close_up(1e3 * moved)
     return None
 
 

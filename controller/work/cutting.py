@@ -22,7 +22,7 @@ from controller.motion.tool_motion import Leg, ToolMotion
 from controller.whole_body.saturation import Saturation
 from controller.work.close_up import CloseUpClient, PostCutCheck, camera_ready, not_as_accepted
 from controller.work.homing import Withdrawal
-from controller.work.point_queue import PointQueue
+from controller.work.point_queue import TOLD_MOVED, PointQueue
 from controller.work.posture_search import CutPlan, Known, NextCut, Permit, PostureSearch, Unreachable, escape_pose
 from controller.work.step_result import StepResult
 from controller.work.survey import Survey
@@ -502,13 +502,17 @@ class CloseUp(MovingStage):
             return self, result
         parts.close_ups.forget(self.point_id)
         ticket = parts.queue.get(self.point_id)
-        if why := not_as_accepted(close_up, ticket, parts.config.work.moved_tolerance):
+        if why := not_as_accepted(close_up, ticket):
             parts.queue.void(self.point_id, why)
             # The next period leaves it.
             return self, result
+        position, accepted = np.array(close_up.position), self._task.accepted
         motion.extend(parts.segments.into(self._task.plan))
-        _shift(motion, np.array(close_up.position))
+        _shift(motion, position)
         self._way.timeout.start(motion.duration)
+        moved = 0.0 if accepted is None else float(np.linalg.norm(position - accepted.position))
+        if moved > TOLD_MOVED:
+            result = result.with_event(reasons.cut_where_seen(self.point_id, 1e3 * moved))
         return Advance(parts, self._task, self._way, None if ticket is None else ticket.point.position), result
 
 

@@ -14,15 +14,19 @@ from controller.work.rule_history import RuleHistory
 from rolling_panda import commands as intents
 from rolling_panda import reasons
 from rolling_panda.commands import POINT_STATES, Handler, Handlers
-from rolling_panda.messages.perception import PruningPoint, PruningPoints, PruningRule, point_digest
+from rolling_panda.messages.perception import PruningPoint, PruningPoints, PruningRule, identity, point_digest
 from rolling_panda.messages.supervision import QueueEntry
 from rolling_panda.messages.types import PointState, Reason
 from rolling_panda.model.differential_drive import Array
 
 #: A cane that turned further than this after acceptance is not the one the operator saw (rad).
 _TURNED_TOLERANCE = 0.35
+#: After a restart, when numbers of canes mean nothing, a cut is recognised by its place: nearer than this (m).
+_SAME_PLACE = 0.005
 #: A point id that returns at a larger distance belongs to another cane (m).
 _ELSEWHERE = 0.03
+#: The operator is told of an accepted cut that is seen farther than this from where it was accepted (m).
+TOLD_MOVED = 0.005
 #: States in which a point is shown from the record if perception does not report it: a person has to decide.
 _ASKED: frozenset[PointState] = frozenset({"ACCEPTED", "UNREACHABLE", "UNKNOWN"})
 #: States with an acceptance and no cut yet. The acceptance is valid while the point is as the operator saw it.
@@ -87,7 +91,9 @@ class PointQueue:
                 elsewhere than accepted, its acceptance is void like any other.
         """
         voided: list[Reason] = []
-        change = self._rule_change(points)
+        # After a restart perception counts its frames from the beginning, and numbers spurs and canes anew.
+        restarted = self.perceived is not None and points.frames < self.perceived.frames
+        change = None if restarted else self._rule_change(points)
         rule = None if change is None else _described(change[1])
         bound = {} if change is None else {name: each for name, each in self._tickets.items() if each.state in BOUND}
         self.perceived = points
@@ -108,8 +114,8 @@ class PointQueue:
             proposer = _proposer(point, points) if ticket.state == "PROPOSED" else ticket.proposer
             known, ticket = ticket, replace(ticket, point=point, seen=True, proposer=proposer)
             why = _by_rule(known, point, rule) if rule is not None and known.seen else None
-            why = why or self._changed(ticket)
-            self._put(point.point_id, self._void(ticket, why, voided) if why else ticket)
+            why = why or self._changed(ticket, by_place=restarted or not known.seen)
+            self._put(point.point_id, self._void(ticket, why, voided) if why else _with_shift(ticket))
         for point_id, ticket in list(self._tickets.items()):
             if point_id in seen or point_id == keep or not ticket.seen:
                 continue
@@ -130,8 +136,7 @@ class PointQueue:
     def _rule_change(self, points: PruningPoints) -> tuple[PruningRule, PruningRule] | None:
         """The rule before these points and theirs, where somebody has changed it."""
         before = self.perceived
-        # After a restart perception counts its frames from the beginning. Its rule is then no change by a person.
-        if before is None or before.rule is None or points.rule is None or points.frames < before.frames:
+        if before is None or before.rule is None or points.rule is None:
             return None
         return None if points.rule == before.rule else (before.rule, points.rule)
 
@@ -411,12 +416,24 @@ class PointQueue:
             self._entries = tuple(_entry(self._tickets[i], self.approaches.of(i)) for i in self._order)
         return self._entries
 
-    def _changed(self, ticket: Ticket) -> Reason | None:
+    @staticmethod
+    def _changed(ticket: Ticket, by_place: bool = False) -> Reason | None:
+        """Why the acceptance of a ticket is void: its point is another cut, or cannot be told from another.
+
+        Args:
+            ticket: Accepted or not.
+            by_place: The numbers of spur and cane are of another run of perception.
+        """
         if ticket.state not in BOUND or ticket.accepted is None:
             return None
-        moved = _apart(ticket.point, ticket.accepted)
-        if moved > self._config.moved_tolerance:
-            return reasons.moved_after_acceptance(1e3 * moved)
+        if ticket.point.nodes_kept != ticket.accepted.nodes_kept:
+            return reasons.other_nodes_kept(ticket.accepted.nodes_kept, ticket.point.nodes_kept)
+        if by_place:
+            moved = _apart(ticket.point, ticket.accepted)
+            if moved > _SAME_PLACE:
+                return reasons.moved_over_restart(1e3 * moved)
+        elif identity(ticket.point) != identity(ticket.accepted):
+            return reasons.other_cane()
         turned = float(np.clip(abs(np.dot(ticket.point.tangent, ticket.accepted.tangent)), 0.0, 1.0))
         if np.arccos(turned) > _TURNED_TOLERANCE:
             return reasons.turned_after_acceptance(float(np.degrees(np.arccos(turned))))
@@ -516,6 +533,16 @@ def _described(rule: PruningRule) -> Reason:
     if rule.system == "guyot":
         return reasons.guyot_rule(rule.nodes_kept, rule.fruiting_nodes, thick, past)
     return reasons.spur_rule(rule.nodes_kept, thick, past)
+
+
+def _with_shift(ticket: Ticket) -> Ticket:
+    """The ticket with a remark on how far from the accepted place its cut is seen now, where that is far."""
+    if ticket.state != "ACCEPTED" or ticket.accepted is None:
+        return ticket
+    if ticket.reason is not None and ticket.reason.code != reasons.seen_elsewhere(0.0).code:
+        return ticket
+    moved = _apart(ticket.point, ticket.accepted)
+    return replace(ticket, reason=reasons.seen_elsewhere(1.0 * round(1e3 * moved)) if moved > TOLD_MOVED else None)
 
 
 def _by_rule(known: Ticket, point: PruningPoint, rule: Reason) -> Reason | None:

@@ -74,6 +74,7 @@ class KnownCane:
     """A cane over all observations.
 
     Attributes:
+        number: Number on its spur.
         best: The most complete observation.
         radius: Estimate (1, m).
         base: Estimate (3, m, odom).
@@ -82,6 +83,7 @@ class KnownCane:
         cut_at: Arc length of a cut that was made (m); infinite while the cane stands.
     """
 
+    number: int
     best: Cane
     radius: Estimate
     base: Estimate
@@ -90,9 +92,9 @@ class KnownCane:
     cut_at: float = np.inf
 
     @classmethod
-    def of(cls, cane: Cane) -> "KnownCane":
+    def of(cls, cane: Cane, number: int) -> "KnownCane":
         """From a single observation."""
-        known = cls(cane, Estimate.of(np.array([cane.radius])), Estimate.of(cane.base))
+        known = cls(number, cane, Estimate.of(np.array([cane.radius])), Estimate.of(cane.base))
         known.nodes = [KnownNode(Estimate.of(np.array([node.arc])), node.pixels) for node in cane.nodes]
         known.radii.append(cane.radius)
         return known
@@ -115,8 +117,8 @@ class KnownCane:
         self.nodes.sort(key=lambda node: node.arc)
 
     def with_median_radius(self, cane: Cane) -> Cane:
-        """An observation of it with the median radius of all: single ones may include wood beside it."""
-        return replace(cane, radius=float(np.median(self.radii)), observations=len(self.radii))
+        """An observation of it with its number and the median radius of all: single ones may include wood beside it."""
+        return replace(cane, radius=float(np.median(self.radii)), observations=len(self.radii), number=self.number)
 
     def as_cane(self) -> Cane:
         """The best observation with the radius and the confirmed nodes of all, up to a cut."""
@@ -130,7 +132,8 @@ class KnownCane:
             stands[:2] = True
         axis, arc = self.best.axis[stands], self.best.arc[stands]
         end = self.best.end if np.isinf(self.cut_at) else "free"
-        return replace(self.best, axis=axis, arc=arc, nodes=nodes, radius=float(self.radius.mean[0]), end=end)
+        radius = float(self.radius.mean[0])
+        return replace(self.best, axis=axis, arc=arc, nodes=nodes, radius=radius, end=end, number=self.number)
 
     def line(self) -> tuple[Vector3, ...]:
         """A few points of the standing axis for display (m, odom); empty where it is too short."""
@@ -165,6 +168,18 @@ class KnownSpur:
             if distances[k] < best[1]:
                 best = index, float(distances[k]), float(cane.best.arc[k])
         return best
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """Standing wood around a position: axes of canes, each N×3, and nodes, N×3 (m, odom)."""
+
+    axes: tuple[Array, ...] = ()
+    nodes: Array = field(default_factory=lambda: np.zeros((0, 3)))
+
+
+#: Of a row that nobody has seen.
+NOTHING_KNOWN = Surroundings()
 
 
 class PlantMap:
@@ -211,6 +226,18 @@ class PlantMap:
         spur, index, distance, arc = min(found, key=lambda each: each[2])
         return spur, spur.canes[index], distance, arc
 
+    def around(self, position: Array, radius: float) -> Surroundings:
+        """What is known within a radius (m) of a position (3, m, odom)."""
+        axes, nodes = [], [np.zeros((0, 3))]
+        for spur in self._spurs.values():
+            for cane in (known.as_cane() for known in spur.canes):
+                near = cane.axis[np.linalg.norm(cane.axis - position, axis=1) < radius]
+                if len(near) >= 2:
+                    axes.append(near)
+                    nodes += [cane.at(node.arc)[None] for node in cane.nodes]
+        found = np.concatenate(nodes)
+        return Surroundings(tuple(axes), found[np.linalg.norm(found - position, axis=1) < radius])
+
     @property
     def spurs(self) -> tuple[KnownSpur, ...]:
         """All spurs, vine by vine."""
@@ -222,11 +249,12 @@ class PlantMap:
 
 
 def _associate(spur: KnownSpur, cane: Cane) -> KnownCane:
-    for known in spur.canes:
-        if _axis_distance(known.best, cane) < _SAME_CANE:
-            known.add(cane)
-            return known
-    spur.canes.append(KnownCane.of(cane))
+    near = [(away, known.number) for known in spur.canes if (away := _axis_distance(known.best, cane)) < _SAME_CANE]
+    if near:
+        same = spur.canes[min(near)[1]]
+        same.add(cane)
+        return same
+    spur.canes.append(KnownCane.of(cane, len(spur.canes)))
     return spur.canes[-1]
 
 

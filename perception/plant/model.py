@@ -54,6 +54,7 @@ class Cane:
         end: Why the axis ends.
         base_gap: Distance from the first axis point to the wood it grows from (m).
         observations: Number of observations in the radius.
+        number: Number on its spur in the plant map, the same in every frame; -1 before it has one.
     """
 
     axis: Array
@@ -64,6 +65,7 @@ class Cane:
     end: CaneEnd
     base_gap: float
     observations: int = 1
+    number: int = -1
 
     @property
     def base(self) -> Array:

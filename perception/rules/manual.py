@@ -135,6 +135,7 @@ def _cut_at(
         reason=reason,
         offset=arc - below[-1].arc if below else None,
         node_distance=node_distance(cane, tuple(below), position),
+        cane=cane.number,
     )
 
 

@@ -48,6 +48,7 @@ class Cut:
         reason: Explanation for a grower.
         offset: Distance past the last kept node along the wood (m); None where no node is below the cut.
         node_distance: Distance to the nearest kept node (m); None where none is known.
+        cane: Number of the cane on its spur, of a renewal cut that of the cane that stays; -1 where it has none.
     """
 
     kind: CutKind
@@ -60,6 +61,7 @@ class Cut:
     reason: Reason
     offset: float | None = None
     node_distance: float | None = None
+    cane: int = -1
 
 
 @dataclass(frozen=True)
@@ -289,6 +291,7 @@ def _shorten(
         reason=_explanation(keeper, 1000 * (arc - last), kept, best - last < config.offset - 1e-9),
         offset=arc - last,
         node_distance=node_distance(cane, nodes[:kept], cane.at(arc)),
+        cane=cane.number,
     )
 
 
@@ -352,4 +355,5 @@ def _renew(spur: Spur, keeper: _Keeper, shorten: Cut, config: RuleConfig, keep_o
         nodes_kept=shorten.nodes_kept,
         reason=reasons.renewal_cut(len(others)),
         node_distance=node_distance(keeper.cane, keeper.cane.nodes, position),
+        cane=keeper.cane.number,
     )

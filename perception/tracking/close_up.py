@@ -1,6 +1,7 @@
 """Close-up check of one point, from the stand-off.
 
-Before a cut it measures the position on the cane from half the distance of the survey and confirms the last kept node.
+Before a cut it finds the point's cane, however far the picture is shifted against the plant map. It measures the
+position on the cane from half the distance of the survey and confirms the last kept node.
 After a cut it tells whether the wood beyond is gone. It never proposes a cut.
 """
 
@@ -10,10 +11,12 @@ import numpy as np
 
 from perception.arrays import Array, interpolate
 from perception.config import CloseUpConfig, PerceptionConfig
+from perception.plant.map import NOTHING_KNOWN, Surroundings
 from perception.segmentation.frame import CANE, SPUR, View
 from perception.segmentation.segmenter import Segmenter
 from perception.skeleton.centreline import Centreline
 from perception.skeleton.topology import trace_canes
+from perception.tracking.picture_shift import picture_shift
 from perception.tracking.presence import wood_presence
 from rolling_panda import messages as m
 from rolling_panda import reasons
@@ -24,6 +27,8 @@ from rolling_panda.model.wire_values import vector3
 
 #: Spacing of axis samples (m), and samples to either side in a tangent.
 _STEP, _TANGENT_SAMPLES = 0.001, 10
+#: Wood of the map within this distance of a point tells how far its picture is shifted (m): inside the window.
+AROUND = 0.07
 
 
 @dataclass(frozen=True)
@@ -53,7 +58,12 @@ class _Cane:
 
 
 def check_close_up(
-    view: View, segmenter: Segmenter, point: m.PruningPoint, number: int, config: PerceptionConfig
+    view: View,
+    segmenter: Segmenter,
+    point: m.PruningPoint,
+    number: int,
+    config: PerceptionConfig,
+    known: Surroundings = NOTHING_KNOWN,
 ) -> CloseUpResult:
     """Check one point in a close-up frame.
 
@@ -63,6 +73,7 @@ def check_close_up(
         point: The published point.
         number: Of the request.
         config: Section `[perception]`.
+        known: Canes and nodes that the map has around the point; without any, the picture counts as not shifted.
 
     Raises:
         UnusablePictureError: The image is blank.
@@ -96,8 +107,12 @@ def check_close_up(
         return result("unseen", reasons.place_outside_picture())
     part = view.part(slice(round(v) - half, round(v) + half), slice(round(u) - half, round(u) + half))
     labels = segmenter.segment(part)
+    lines = trace_canes(part, labels, config.skeleton)
+    shift = picture_shift(known, lines, position, along)
+    moved = 0.0 if shift is None else float(np.linalg.norm(shift))
+    position = position if shift is None else position + shift
     beyond = wood_presence(part, labels, position + limits.probe_distance * along)[0]
-    cane = _cane_at(position, along, trace_canes(part, labels, config.skeleton), limits)
+    cane = _cane_at(position, along, lines, limits)
     if cane is None:
         # A renewal cut is on a stub.
         wood = np.where(labels == SPUR, np.uint8(CANE), labels)
@@ -110,6 +125,8 @@ def check_close_up(
         if cane.end_reason == "free":
             return result("severed")
         return result("unseen", reasons.beyond_cut_hidden(), cane)
+    if shift is None and cane.distance > limits.sure_offset:
+        return result("unseen", reasons.which_cane_unclear(1e3 * cane.distance), cane)
     if beyond == "gone":
         return result("unseen", reasons.cane_end_unclear(), cane)
     if point.offset is None:
@@ -121,6 +138,8 @@ def check_close_up(
     crowding = [arc for arc in cane.nodes if abs(arc) < limits.node_clearance]
     if crowding:
         return result("changed", reasons.node_near_cut(1e3 * abs(float(crowding[0]))), cane)
+    if moved > limits.sure_offset:
+        return result("unseen", reasons.node_unseen_in_shifted_picture(1e3 * moved), cane)
     return result("seen", reasons.node_before_cut_unseen(), cane)
 
 

@@ -20,7 +20,7 @@ from perception.segmentation.frame import View
 from perception.tracking.presence import wood_presence
 from rolling_panda import messages as m
 from rolling_panda import reasons
-from rolling_panda.messages.perception import point_digest
+from rolling_panda.messages.perception import identity, point_digest
 from rolling_panda.messages.types import CutKind
 from rolling_panda.model.wire_values import vector3
 
@@ -90,6 +90,11 @@ class _Track:
     @property
     def site(self) -> Site:
         return self.number, self.cut.kind
+
+    def is_for(self, cut: Cut) -> bool:
+        """Whether a cut near it may be its own: of the same kind, and on the same cane as far as both are known."""
+        same_cane = cut.cane == self.cut.cane or -1 in (cut.cane, self.cut.cane)
+        return cut.kind == self.cut.kind and same_cane
 
     def add(self, cut: Cut, window: int) -> None:
         self.hits += 1
@@ -286,7 +291,7 @@ class Tracker:
         pairs = sorted(
             (distance(known[t].position, proposals[p].cut.position), t, p)
             for t, p in close.tolist()
-            if known[t].cut.kind == proposals[p].cut.kind
+            if known[t].is_for(proposals[p].cut)
         )
         supported: list[_Track] = []
         used: set[int] = set()
@@ -358,6 +363,7 @@ class Tracker:
             offset=cut.offset,
             force=cutting_force(float(track.radius)),
             node_distance=cut.node_distance,
+            cane=cut.cane,
         )
         if old is not None:
             same = self._same_cut(old, point)
@@ -373,10 +379,9 @@ class Tracker:
     def _same_cut(self, old: m.PruningPoint, new: m.PruningPoint) -> bool:
         moved = float(np.linalg.norm(np.subtract(new.position, old.position)))
         turned = float(np.arccos(np.clip(np.dot(new.tangent, old.tangent), -1.0, 1.0)))
-        counts = (new.kind, new.nodes_kept, new.vine, new.spur) == (old.kind, old.nodes_kept, old.vine, old.spur)
         shifted = abs((new.offset or 0.0) - (old.offset or 0.0))
         same_pose = moved <= self._config.position_tolerance and turned <= self._config.tangent_tolerance
-        return counts and same_pose and shifted < _SAME_OFFSET
+        return identity(new) == identity(old) and same_pose and shifted < _SAME_OFFSET
 
 
 def position_covariance(scatter: Array, count: int) -> Array:

@@ -42,6 +42,8 @@ class PruningPoint(Struct, frozen=True, forbid_unknown_fields=True):
         nodes_kept: Number of count nodes that stay below the cut.
         vine: Number of the vine along the row, as perceived.
         spur: Number of the spur position on that vine, as perceived.
+        cane: Number of the cane on that spur, as perceived; of a renewal cut that of the cane that stays. It names the
+            same cane for as long as perception runs; -1 if unknown.
         reason: Explanation of the cut for a grower.
         kind: `spur cut` shortens the cane that stays, `renewal cut` removes the old stub, `cane cut` shortens the
             fruiting cane, `by hand` was placed by a person.
@@ -75,6 +77,7 @@ class PruningPoint(Struct, frozen=True, forbid_unknown_fields=True):
     cordon_distance: Finite | None = None
     node_distance: NonNegative | None = None
     digest: Digest = ""
+    cane: Annotated[int, Meta(ge=-1, le=100000)] = -1
 
 
 class PruningRule(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -303,6 +306,14 @@ class Obstacles(Message, frozen=True, kw_only=True):
 
     header: Header
     capsules: tuple[Capsule, ...]
+
+
+def identity(point: PruningPoint) -> tuple[str | int, ...]:
+    """What a cut is, wherever it is seen: its kind, the nodes kept, and vine, spur and cane.
+
+    The internode follows from the nodes kept. Equal only within one run of perception, which numbers spurs and canes.
+    """
+    return point.kind, point.nodes_kept, point.vine, point.spur, point.cane
 
 
 def point_digest(point: PruningPoint) -> str:

@@ -118,21 +118,21 @@ def look(finding="seen", dx=0.0, reason=None):
 @pytest.mark.parametrize(
     ("seen", "why"),
     [
-        (look(dx=0.0049), None),
-        (look(dx=0.007), reasons.moved_in_close_up(7.0)),
+        (look(), None),
+        (look(dx=0.02), None),
         (look("changed", reason=reasons.said("a node")), reasons.changed_in_close_up(reasons.said("a node"))),
         (look("severed"), reasons.gone_already()),
         (look("unseen", reason=reasons.said("hidden")), reasons.unseen_in_close_up(reasons.said("hidden"))),
     ],
 )
-def test_only_what_is_seen_where_it_was_accepted_is_cut(seen, why):
-    found = not_as_accepted(seen, TICKET, 0.005)
+def test_only_what_the_close_up_sees_is_cut_wherever_it_sees_it(seen, why):
+    found = not_as_accepted(seen, TICKET)
     assert found == why or (found.code, dict(found.values)) == (why.code, pytest.approx(dict(why.values)))
 
 
 def test_without_an_acceptance_nothing_is_cut():
-    assert not_as_accepted(look(), Ticket(ACCEPTED), 0.005)
-    assert not_as_accepted(look(), None, 0.005)
+    assert not_as_accepted(look(), Ticket(ACCEPTED))
+    assert not_as_accepted(look(), None)
 
 
 def looking(r, *, dx=0.0, finding="seen", point_id="a"):
@@ -151,19 +151,21 @@ def looking(r, *, dx=0.0, finding="seen", point_id="a"):
     return r
 
 
-def test_a_point_that_moved_is_not_cut_says_why_and_the_work_goes_on():
-    r = looking(working((point("a", (0.5, 0.75, 1.0)), point("b", (0.8, 0.75, 1.05)))), dx=0.007)
+def test_a_point_that_the_close_up_shows_changed_is_not_cut_says_why_and_the_work_goes_on():
+    r = looking(working((point("a", (0.5, 0.75, 1.0)), point("b", (0.8, 0.75, 1.05)))), finding="changed")
     finish(r, 60.0)
     assert [cut[0] for cut in r.cuts] == ["b"]
     assert entry(r, "a").state == "PROPOSED" and entry(r, "a").reason.code == "acceptance_void"
     assert entry(r, "b").state == "DONE"
 
 
-def test_within_five_millimetres_the_place_of_the_closer_look_is_cut():
-    r = looking(working((point("a", (0.5, 0.75, 1.0)),)), dx=0.004)
+@pytest.mark.parametrize(("dx", "told"), [(0.004, False), (0.02, True)])
+def test_the_place_of_the_close_up_is_cut_and_the_log_says_how_far_it_is_from_the_accepted_one(dx, told):
+    r = looking(working((point("a", (0.5, 0.75, 1.0)),)), dx=dx)
     finish(r, 30.0)
     assert entry(r, "a").state == "DONE"
-    assert abs(r.cuts[0][1][0, 3] - 0.504) < 0.0015
+    assert abs(r.cuts[0][1][0, 3] - 0.5 - dx) < 0.0015
+    assert any("a is cut 20 mm from where it was accepted" in event for event in r.events) is told
 
 
 def test_the_phase_is_told_while_the_robot_looks_and_the_blades_stay_out_of_the_canes():

@@ -46,14 +46,38 @@ def test_accepting_an_old_view_is_refused():
     assert state(q) == "PROPOSED"
 
 
-def test_a_point_that_moved_or_turned_is_not_accepted_any_more():
-    for changes in ({"position": (1.0, 0.85, 1.006)}, {"tangent": (0.0, 0.5, 0.866)}):
+def test_the_same_cut_stays_accepted_however_far_the_picture_moves_and_the_operator_is_told_how_far():
+    q = queue(point())
+    q.accept("a", 3, "ada")
+    assert q.update(shown(point(revision=4, position=(1.0, 0.86, 1.02)))) == []
+    assert state(q) == "ACCEPTED" and q.next().accepted == POINT
+    assert q.entries()[0].reason == reasons.seen_elsewhere(22.0)
+    q.update(shown(point(revision=5, position=(1.0, 0.85, 1.001))))
+    assert q.entries()[0].reason is None
+
+
+def test_another_cane_another_count_or_a_cane_that_turned_is_not_accepted_any_more():
+    turned = {"tangent": (0.0, 0.5, 0.866)}
+    for changes in ({"cane": 1}, {"spur": 2}, {"vine": 1}, {"kind": "renewal cut"}, {"nodes_kept": 3}, turned):
         q = queue(point())
         q.accept("a", 3, "ada")
         voided = q.update(shown(point(revision=4, **changes)))
         assert len(voided) == 1 and voided[0] == reasons.acceptance_lost("a", q.get("a").reason)
         assert state(q) == "PROPOSED" and q.next() is None
         assert q.get("a").reason.code == "acceptance_void"
+
+
+def test_after_a_restart_of_perception_numbers_mean_nothing_and_the_place_decides():
+    def after_restart(**changes):
+        q = queue()
+        q.update(m.PruningPoints(header=m.Header(), segmenter="none", frames=90, points=(point(),)))
+        q.accept("a", 3, "ada")
+        q.update(m.PruningPoints(header=m.Header(), segmenter="none", frames=4, points=(point(**changes),)))
+        return state(q)
+
+    assert after_restart(spur=3, cane=2, position=(1.0, 0.85, 1.004)) == "ACCEPTED"
+    assert after_restart(position=(1.0, 0.85, 1.006)) == "PROPOSED"
+    assert after_restart(nodes_kept=3) == "PROPOSED"
 
 
 def test_a_point_that_vanished_is_not_cut_and_a_new_look_is_needed():
@@ -267,7 +291,7 @@ def test_a_plan_says_nothing_of_what_was_accepted_otherwise_or_is_worked_on():
 
 def test_an_acceptance_out_of_reach_is_void_like_any_other_and_can_be_taken_back():
     q = beyond()
-    (lost,) = q.update(shown(point(revision=4, position=(1.0, 0.85, 1.006))))
+    (lost,) = q.update(shown(point(revision=4, cane=1)))
     assert lost.code == "acceptance_lost" and lost.values[1][1].code == "acceptance_void"
     assert state(q) == "PROPOSED"
     q = beyond()
@@ -294,7 +318,7 @@ def test_whatever_happens_only_what_somebody_accepted_is_out_of_reach_and_what_i
             q.reject("a", "ada", "")
         elif step == "move":
             revision += 1
-            q.update(shown(point(revision=revision, position=(1.0 + 0.006 * (revision % 2), 0.85, 1.0))))
+            q.update(shown(point(revision=revision, cane=revision % 2)))
         else:
             q.update(shown(*([point(revision=revision)] if step == "seen" else [])))
         ticket = q.get("a")

@@ -60,7 +60,7 @@ def test_an_acceptance_is_void_when_the_point_is_elsewhere_after_the_restart():
     life.queue.accept("a", 3, "ada")
     life = life.restarted()
     (voided,) = life.queue.update(shown(point(position=(1.0, 0.85, 1.01))))
-    assert "moved by 10 mm" in text_of(voided) and life.state() == "PROPOSED"
+    assert "10 mm from where it was accepted" in text_of(voided) and life.state() == "PROPOSED"
 
 
 def test_an_acceptance_that_does_not_fit_its_hash_is_none():

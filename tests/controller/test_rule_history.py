@@ -91,7 +91,7 @@ def test_what_somebody_has_decided_since_or_is_elsewhere_stays_as_it_is():
     q.update(shown(A_SHORT, rule=SHORT))
     assert q.reject("a", "eve", "wrong cane") is None
     assert q.undo_rule(SHORT) is None
-    q.update(shown(A, revised("b", 2.006, 4)))
+    q.update(shown(A, msgspec.structs.replace(revised("b", 2.0, 4), cane=1)))
     assert [state(q, name) for name in "abc"] == ["REJECTED", "PROPOSED", "PROPOSED"]
     assert q.restored() is None
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from bridge.sim.camera.config import CameraConfig
 from bridge.sim.camera.frame import camera_frame, survey_place
@@ -14,9 +15,10 @@ from bridge.sim.vineyard.row import Row
 from bridge.sim.vineyard.truth import RightCut, judge
 from controller.work.posture_search import cut_poses
 from perception.config import PerceptionConfig
+from perception.plant.map import NOTHING_KNOWN, Surroundings
 from perception.segmentation.frame import View, decode_frame
 from perception.segmentation.segmenter import LabelImageSegmenter
-from perception.tracking.close_up import check_close_up
+from perception.tracking.close_up import AROUND, check_close_up
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.messages.perception import CloseUpResult
@@ -69,8 +71,24 @@ def view_from_clear(row: Row, cut: RightCut, clearance: float = 0.22) -> View:
     return replace(view, R=place[:3, :3], t=place[:3, 3])
 
 
-def look(view: View, seen: m.PruningPoint) -> CloseUpResult:
-    return check_close_up(view, SEES, seen, 7, PerceptionConfig())
+def look(view: View, seen: m.PruningPoint, known: Surroundings = NOTHING_KNOWN) -> CloseUpResult:
+    return check_close_up(view, SEES, seen, 7, PerceptionConfig(), known)
+
+
+def surroundings(row: Row, position: np.ndarray) -> Surroundings:
+    """What a perfect map knows around a position."""
+    canes: dict[tuple[int, int, int], list[np.ndarray]] = {}
+    nodes = []
+    for _, rod in row.standing():
+        if rod.cane >= 0:
+            steps = np.linspace(0.0, 1.0, 6)[:, None]
+            canes.setdefault((rod.vine, rod.spur, rod.cane), []).append(rod.start + steps * (rod.end - rod.start))
+            nodes += [rod.at(0.5)[0]] if rod.kind == "node" else []
+    near = [axis[np.linalg.norm(axis - position, axis=1) < AROUND] for axis in map(np.concatenate, canes.values())]
+    found = np.array(nodes)
+    return Surroundings(
+        tuple(axis for axis in near if len(axis) >= 2), found[np.linalg.norm(found - position, axis=1) < AROUND]
+    )
 
 
 def without(row: Row, cut: RightCut) -> Row:
@@ -98,6 +116,29 @@ def test_the_node_before_the_cut_says_where_along_the_cane_it_belongs(scene: Sce
         shifts.append(float(np.subtract(there.position, here.position) @ cut.tangent))
     assert len(shifts) >= len(scene.cuts) / 2
     assert np.median(np.abs(shifts)) < 0.0015
+
+
+@pytest.mark.parametrize("turn", [(0.0, 0.045, 0.0), (0.045, 0.0, 0.0)])
+def test_a_picture_of_a_camera_that_is_turned_shows_the_same_cane_where_that_picture_has_it(scene: Scene, turn) -> None:
+    confirmed, lost = [], 0
+    for cut, view in scene.pairs():
+        R = view.R @ Rotation.from_rotvec(turn).as_matrix()
+        seen = look(replace(view, R=R), point(cut), surroundings(scene.row, cut.best))
+        there = view.t + R @ view.R.T @ (cut.best - view.t)
+        assert float(np.linalg.norm(there - cut.best)) > 0.012, "more than any cane is looked for without a shift"
+        if seen.finding == "seen":
+            confirmed.append(float(np.linalg.norm(np.array(seen.position) - there)))
+        lost += seen.finding in ("severed", "changed")
+    assert len(confirmed) >= 0.6 * len(scene.cuts) and lost == 0
+    assert max(confirmed) < 0.008
+
+
+def test_a_cane_beside_the_place_is_not_taken_for_it_where_nothing_around_agrees(scene: Scene) -> None:
+    cut, view = scene.pairs()[0]
+    strange = surroundings(scene.row, cut.best)
+    strange = Surroundings(tuple(axis + [0.0, 0.1, 0.0] for axis in strange.axes), strange.nodes)
+    beside = look(view, point(cut, aside=0.008), strange)
+    assert beside.finding == "unseen" and beside.reason.code == "which_cane_unclear" and beside.position is None
 
 
 def test_after_the_cut_it_says_that_the_wood_beyond_is_off_and_before_never(scene: Scene) -> None:

@@ -29,8 +29,8 @@ def view(cane=True, depth=0.8):
     return View(0, 0.0, intrinsics, image, labels, b"", np.eye(3), np.zeros(3))
 
 
-def proposal(x=0.0, y=0.0, z=0.8, spur=1, tangent=UP):
-    cut = Cut("spur cut", np.array([x, y, z]), tangent, 0.004, 0.9, 4, 2, "Because.")
+def proposal(x=0.0, y=0.0, z=0.8, spur=1, tangent=UP, cane=-1):
+    cut = Cut("spur cut", np.array([x, y, z]), tangent, 0.004, 0.9, 4, 2, "Because.", cane=cane)
     return Proposal(cut, SpurNumber(1, spur))
 
 
@@ -49,6 +49,17 @@ def test_a_point_shows_after_enough_frames_agree():
     tracker = Tracker(CONFIG)
     shown = [len(feed(tracker, view(), proposal()).points) for _ in range(CONFIG.min_hits)]
     assert shown == [0] * (CONFIG.min_hits - 1) + [1]
+
+
+def test_a_cut_of_another_cane_beside_it_is_another_point_however_near():
+    tracker = Tracker(CONFIG)
+    for _ in range(CONFIG.min_hits):
+        (first,) = feed(tracker, view(), proposal(cane=0)).points or (None,)
+    for look in range(2 * CONFIG.min_hits + 1):
+        points = feed(tracker, view(), proposal(x=0.012, cane=1)).points
+        assert look or points == (first,)
+    (other,) = points
+    assert (first.cane, other.cane) == (0, 1) and other.point_id != first.point_id
 
 
 def test_where_most_looks_cut_an_internode_is_taken_whole_not_half_way_to_where_others_did():

@@ -145,6 +145,8 @@ export interface PruningPoint {
   node_distance: number|null;
   /** Hash of the revision's place and kind, see `point_digest`. */
   digest: string;
+  /** Number of the cane on that spur, as perceived; of a renewal cut that of the cane that stays. It names the same cane for as long as perception runs; -1 if unknown. */
+  cane: number;
 }
 
 /** A pruning point in the controller's queue. */

@@ -1,0 +1,86 @@
+"""How far a close-up picture is shifted against the plant map.
+
+An error of the hand-eye calibration, of the odometry or of the joints shifts all wood in a picture alike. The shift is
+the one under which the canes and nodes that are known around a point coincide with those that the picture shows. It
+tells the point's own cane from its neighbours, however far the picture is shifted.
+"""
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from perception.arrays import Array, interpolate
+from perception.plant.map import Surroundings
+from perception.skeleton.centreline import Centreline
+
+#: Largest shift that is looked for (m): half the usual distance between two canes.
+_REACH = 0.03
+#: Wood nearer than this to where it is expected is there (m).
+_THERE = 0.008
+#: Least share of the known wood that a shift must explain, and by how much a larger shift must explain more.
+_EXPLAINED, _BETTER = 0.5, 0.15
+#: Spacing of samples of a line (m).
+_SPACING = 0.002
+
+
+def picture_shift(known: Surroundings, lines: list[Centreline], position: Array, along: Array) -> Array | None:
+    """Shift (3, m, odom) of a picture: where a point is seen, less where it is in the map.
+
+    Args:
+        known: Canes and nodes around the point; without any, the shift is zero.
+        lines: Canes that the picture shows.
+        position: The point (3, m, odom).
+        along: Unit vector along its cane (3, odom).
+
+    Returns:
+        The smallest shift that explains the known wood well; None where no shift explains it.
+    """
+    if not known.axes:
+        return np.zeros(3)
+    if not lines:
+        return None
+    samples = [interpolate(np.arange(0.0, float(line.arc[-1]), _SPACING), line.arc, line.axis) for line in lines]
+    seen, wood = cKDTree(np.concatenate(samples)), np.concatenate(known.axes)
+    shifts = [np.zeros(3)]
+    shifts += [shift for axis in known.axes for line in samples if (shift := _across(axis, line, position)) is not None]
+    shares = np.array([float(np.mean(seen.query(wood + shift)[0] < _THERE)) for shift in shifts])
+    if shares.max() < _EXPLAINED:
+        return None
+    good = [shift for shift, share in zip(shifts, shares, strict=True) if share >= shares.max() - _BETTER]
+    across = min(good, key=lambda shift: float(np.linalg.norm(shift)))
+    return across + _along(known.nodes + across, _nodes(lines), along) * along
+
+
+def _across(axis: Array, line: Array, position: Array) -> Array | None:
+    """Shift (3, m) square to a known axis that brings it onto a line near the point; None where that is too far."""
+    k = int(np.argmin(np.linalg.norm(axis - position, axis=1)))
+    chord = axis[min(k + 1, len(axis) - 1)] - axis[max(k - 1, 0)]
+    direction = chord / max(float(np.linalg.norm(chord)), 1e-9)
+    away = line - axis[k]
+    across = away - (away @ direction)[:, None] * direction
+    nearest = int(np.argmin(np.linalg.norm(away, axis=1)))
+    shift: Array = across[nearest]
+    # A line that ends before it comes past the point says nothing.
+    beside = abs(float(away[nearest] @ direction)) < _THERE
+    return shift if beside and float(np.linalg.norm(shift)) <= _REACH else None
+
+
+def _along(known: Array, seen: Array, along: Array) -> float:
+    """Shift along the cane (m) that at least two nodes agree on; 0 where the nodes are as expected, or say nothing."""
+    if not len(known) or not len(seen):
+        return 0.0
+    apart = seen[None] - known[:, None]
+    steps = apart @ along
+    beside = np.linalg.norm(apart - steps[..., None] * along, axis=2) < _THERE
+
+    def explained(shift: float) -> int:
+        return int((beside & (np.abs(steps - shift) < _THERE)).any(axis=1).sum())
+
+    shifts = steps[beside & (np.abs(steps) <= _REACH)].tolist()
+    best = max(shifts, key=lambda shift: (explained(shift), -abs(shift)), default=0.0)
+    return float(best) if explained(best) >= 2 and explained(best) > explained(0.0) else 0.0
+
+
+def _nodes(lines: list[Centreline]) -> Array:
+    """Positions of all nodes (N×3, m, odom)."""
+    found = [interpolate(np.array([node.arc for node in line.nodes]), line.arc, line.axis) for line in lines]
+    return np.concatenate([np.zeros((0, 3)), *(each for each in found if len(each))])
