@@ -2157,8 +2157,8 @@ def other_cane() -> None:
 
 
 @_reason("warning", "")
-def other_nodes_kept(before: int, now: int) -> None:
-    """It left {before} nodes when it was accepted, and leaves {now} now."""
+def other_nodes_kept(before: float, now: float) -> None:
+    """It left {before:.0f} nodes when it was accepted, and leaves {now:.0f} now."""
 
 
 @_reason("info", "")
