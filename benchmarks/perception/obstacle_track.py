@@ -5,11 +5,12 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
+from msgspec import Struct
 
 from benchmarks.control.row_walk import walk
-from benchmarks.perception.obstacles import Place, Track
 from bridge.sim.robot.robot import SimulatedRobot
 from rolling_panda import commands as intents
+from rolling_panda import messages as m
 from rolling_panda.messages import Message
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.resources import resource
@@ -18,6 +19,28 @@ from tests.support.worlds.closed_loop import ClosedLoop
 #: Places that are kept, evenly in time, and how far the base goes along the row (m).
 _KEPT, _END = 160, 3.4
 _SURVEY_S = 6.0
+
+
+class Place(Struct, frozen=True):
+    """Where a picture is taken.
+
+    Attributes:
+        base: As measured.
+        position: Of the joints, as measured.
+        camera: Where the camera really is, 4×4 by rows; empty where the measurement is true.
+    """
+
+    base: m.PlanarPose
+    position: m.Actuated
+    camera: tuple[float, ...] = ()
+
+
+class Track(Struct, frozen=True):
+    """Places of one run of work, at the rate at which the camera took them."""
+
+    seed: int
+    seconds: float
+    places: tuple[Place, ...]
 
 
 class _Watched(ClosedLoop):

@@ -14,12 +14,12 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
-from msgspec import Struct
 from numpy.typing import NDArray
 
 from benchmarks.common.documents import bench_parser, write
 from benchmarks.common.intervals import quantile
 from benchmarks.perception.obstacle_judge import KINDS, ObstacleJudge, Verdict
+from benchmarks.perception.obstacle_track import Place, Track, record
 from bridge.sim.camera.config import CameraConfig
 from bridge.sim.camera.frame import camera_frame, camera_pose, survey_place
 from bridge.sim.camera.renderer import Camera
@@ -45,28 +45,6 @@ _PLACES = (0.0, -0.5)
 #: What is told is judged so many times in the run.
 _JUDGED = 20
 _TRACK = Path(__file__).parents[1] / "results" / "obstacle_work.json"
-
-
-class Place(Struct, frozen=True):
-    """Where a picture is taken.
-
-    Attributes:
-        base: As measured.
-        position: Of the joints, as measured.
-        camera: Where the camera really is, 4×4 by rows; empty where the measurement is true.
-    """
-
-    base: m.PlanarPose
-    position: m.Actuated
-    camera: tuple[float, ...] = ()
-
-
-class Track(Struct, frozen=True):
-    """Places of one run of work, at the rate at which the camera took them."""
-
-    seed: int
-    seconds: float
-    places: tuple[Place, ...]
 
 
 @dataclass(frozen=True)
@@ -213,8 +191,6 @@ def main(argv: Sequence[str]) -> int:
     if words.minutes <= 0.0 or words.pictures < 2 or any(seed < 0 for seed in words.seeds):
         parser.error("give more than 0 minutes, at least 2 pictures, and seeds of 0 or more")
     if words.record is not None:
-        from benchmarks.perception.obstacle_track import record
-
         print(record(words.record, _TRACK))
         return 0
     segmenter = choose_segmenter(words.segmenter)
