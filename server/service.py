@@ -90,7 +90,6 @@ def run(context: ProcessContext) -> None:
                     wires,
                     sessions,
                     listener,
-                    address,
                     context.stopping,
                     access_options,
                     freeze_heap,
@@ -104,7 +103,6 @@ async def serve(
     wires: Mapping[str, Transport],
     sessions: Sessions,
     listener: Listener,
-    address: str,
     stopping: threading.Event,
     access_options: Access | None = None,
     on_ready: Callable[[], None] = lambda: None,
@@ -117,7 +115,6 @@ async def serve(
         wires: The wire of each robot, by name.
         sessions: Sign-in tokens and sessions.
         listener: Listening socket.
-        address: Of the page on this machine.
         stopping: Ends the server.
         access_options: Users and TLS.
         on_ready: Called before the first request is served.
@@ -127,7 +124,6 @@ async def serve(
     port = int(listener.getsockname()[1])
     app_state = AppState(
         sessions,
-        address,
         # Cookies ignore ports: two servers on one machine need different names.
         f"rolling_panda_{port}",
         config.invite_s,

@@ -167,9 +167,10 @@ class Outcome(BaseModel):
 
 
 class Invited(Outcome):
-    """Success, and the sign-in link."""
+    """Success, the sign-in link, and the rows of its QR code, of which 1 is a dark module."""
 
     link: str
+    qr: list[str]
 
 
 class Me(BaseModel):

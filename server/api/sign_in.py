@@ -5,11 +5,13 @@ from pathlib import Path
 from typing import Annotated
 
 import msgspec
+import segno
 from fastapi import APIRouter, Depends, Header, Request, Response
 from fastapi.responses import FileResponse, JSONResponse, RedirectResponse
 
 from rolling_panda import reasons
 from rolling_panda.cli.about import about
+from rolling_panda.messages.types import Reason
 from server.api import bodies as body
 from server.api.dependencies import Caller, Supervisor, Visitor
 from server.api.page_files import PageFiles
@@ -124,9 +126,12 @@ def sign_in_router(app_state: AppState) -> APIRouter:
         return body.Me(user=session.user, role=session.role)
 
     @router.post("/api/invite", tags=["sessions"], responses=COMMAND | {200: {"model": body.Invited}})
-    async def invite(session: Supervisor, request: body.Invite) -> Response:
-        """A single-use sign-in link for another user or a script. Supervisors only."""
-        made = app_state.invite(session, request.user, request.role)
-        return JSONResponse(outcome(True) | {"link": made}) if isinstance(made, str) else answer(Result(403, made))
+    async def invite(session: Supervisor, request: body.Invite, origin: Origin) -> Response:
+        """A single-use sign-in link for another user or a script, and as a QR code. Supervisors only."""
+        made = app_state.invite(session, request.user, request.role, origin)
+        if isinstance(made, Reason):
+            return answer(Result(403, made))
+        rows = ["".join("1" if dark else "0" for dark in row) for row in segno.make_qr(made).matrix]
+        return JSONResponse(outcome(True) | {"link": made, "qr": rows})
 
     return router

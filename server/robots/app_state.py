@@ -17,7 +17,6 @@ class AppState:
 
     Attributes:
         sessions: Signed-in sessions.
-        address: Of the page on this machine.
         cookie: Name of the session cookie.
         invite_s: Lifetime of a sign-in link that a supervisor makes (s).
         max_body_bytes: Longest request body.
@@ -26,7 +25,6 @@ class AppState:
     """
 
     sessions: Sessions
-    address: str
     cookie: str
     invite_s: float
     max_body_bytes: int
@@ -46,13 +44,13 @@ class AppState:
         self.sessions.end(session)
         self.note(reasons.signed_out(session.user))
 
-    def invite(self, session: Session, user: str, role: m.Role) -> str | m.Reason:
-        """A link that signs `user` in once, or why there is none."""
+    def invite(self, session: Session, user: str, role: m.Role, origin: str) -> str | m.Reason:
+        """A link to the page at `origin` that signs `user` in once, or why there is none."""
         if self.passwords is not None:
             return reasons.invitation_impossible()
         token = self.sessions.invite(user, role, time.monotonic() + self.invite_s)
         self.note(reasons.invited(session.user, user, role))
-        return f"{self.address}/sign-in?token={token}"
+        return f"{origin}/sign-in?token={token}"
 
     def end_void_sessions(self) -> None:
         """Sign out the sessions of removed and changed accounts."""

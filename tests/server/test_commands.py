@@ -3,7 +3,9 @@ import threading
 import time
 
 import msgspec
+import numpy as np
 import pytest
+import segno
 
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
@@ -295,10 +297,20 @@ def test_only_a_supervisor_may_release_a_stop_or_invite(server):
 
 def test_an_invited_person_can_sign_in_with_their_role(server, client):
     link = client.post("/api/invite", json={"user": "bob", "role": "viewer"}).json()["link"]
+    assert link.startswith(f"{server.address}/sign-in?token="), "it leads to the address that the supervisor uses"
     with server.visitor() as visitor:
         visitor.headers["origin"] = server.address
         assert visitor.post("/api/sign-in", json={"token": link.split("token=")[1]}).status_code == 200
         assert visitor.get("/api/me").json() == {"user": "bob", "role": "viewer"}
+
+
+def test_an_invitation_is_a_qr_code_too(client):
+    invited = client.post("/api/invite", json={"user": "bob", "role": "viewer"}).json()
+    modules = np.array([[int(module) for module in row] for row in invited["qr"]], dtype=bool)
+    assert modules.shape[0] == modules.shape[1] >= 25
+    corner = modules[:7, :7]
+    assert corner[0].all() and not corner[1, 1:6].any() and corner[2:5, 2:5].all(), "a mark to find it by"
+    assert np.array_equal(modules, np.array([[*row] for row in segno.make_qr(invited["link"]).matrix], dtype=bool))
 
 
 def test_state_and_points_are_what_the_robot_said_last(server, client):

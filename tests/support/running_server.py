@@ -70,7 +70,7 @@ def running_server(wire, config=None, access=None, state=None, **others):
         access = access or Access()
         address = f"{access.scheme}://127.0.0.1:{listener.getsockname()[1]}"
         wires = {"rp1": wire, **others}
-        work = serve(config or ServerConfig(), wires, sessions, listener, address, stopping, access, state=state)
+        work = serve(config or ServerConfig(), wires, sessions, listener, stopping, access, state=state)
         failure = []
 
         def run():
