@@ -48,7 +48,7 @@ def run(config: ArmConfig, limits: Limits, link: ArmLink, moving: bool, parent: 
             session.serve()
         except RuntimeError as error:
             # Base class of all errors of libfranka.
-            session.say(reasons.device_fault("arm", _words(error)))
+            session.say(reasons.device_fault("Panda", _words(error)))
             time.sleep(_RETRY_S)
 
 
@@ -129,7 +129,7 @@ class _Session:
                 self._command, libfranka.ControllerMode.kJointImpedance, limit_rate=False, cutoff_frequency=_NO_FILTER
             )
         except RuntimeError as error:
-            self.say(reasons.device_fault("arm", _words(error)), severe=True)
+            self.say(reasons.device_fault("Panda", _words(error)), severe=True)
 
     def _command(self, state: Any, duration: Any) -> Any:
         """Libfranka's callback, each millisecond."""
