@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rolling_panda.errors import RollingPandaError
-from rolling_panda.generate import languages, safety
+from rolling_panda.generate import guides, languages, safety
 from rolling_panda.generate.javascript import messages_module, messages_types, reasons_catalogue
 from rolling_panda.generate.markdown import fill, reasons_table
 from rolling_panda.transport.access import access_control
@@ -34,7 +34,7 @@ def generated(root: Path = ROOT) -> dict[Path, str]:
         wire: fill(wire.read_text(encoding="utf-8")),
         reasons_page: fill(reasons_page.read_text(encoding="utf-8"), reasons_blocks, "docs/reasons.md"),
         safety_page: fill(safety_page.read_text(encoding="utf-8"), safety.BLOCKS, "docs/safety.md"),
-    }
+    } | guides.guides(root)
 
 
 def router_config() -> str:
@@ -75,6 +75,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if arguments.write:
             texts = generated()
             for path in old:
+                path.parent.mkdir(exist_ok=True)
                 path.write_text(texts[path], encoding="utf-8")
                 print(f"wrote {path.relative_to(ROOT)}")
             return 0
@@ -85,9 +86,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(
             f"{path.relative_to(ROOT)} is out of date; run: python -m rolling_panda.generate --write", file=sys.stderr
         )
-    wrong = languages.problems(ROOT / "web" / "text")
+    texts_folder = ROOT / "web" / "text"
+    wrong = [f"web/text/{problem}" for problem in languages.problems(texts_folder)]
+    wrong += guides.problems(ROOT, languages.languages(texts_folder))
     for problem in wrong:
-        print(f"web/text/{problem}", file=sys.stderr)
+        print(problem, file=sys.stderr)
     return 1 if old or wrong else 0
 
 
