@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import get_args
 
 import msgspec
+import segno
 from playwright.sync_api import Page, expect
 
 from rolling_panda import messages as m
@@ -304,7 +305,8 @@ def _viewer(page: Page, server: PlayedServer) -> None:
 def _invite(page: Page, server: PlayedServer) -> None:
     working(page, server)
     link = "http://127.0.0.1:8000/sign-in?token=1s0n1y-4n-3x4mp13"
-    server.answers["/api/invite"] = (200, {"ok": True, "reason": "", "link": link})
+    rows = ["".join(str(module) for module in row) for row in segno.make_qr(link).matrix]
+    server.answers["/api/invite"] = (200, {"ok": True, "reason": "", "link": link, "qr": rows})
     page.locator("#person").click()
     page.locator("#invite").click()
     page.locator("#invite-user").fill("Bob")

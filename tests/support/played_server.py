@@ -27,7 +27,7 @@ from tests.support.page_host import ORIGIN, PlayedRequest, PlayedSocket, page_ho
 __all__ = ["ORIGIN"]
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self' ws://panda.test; "
-    "frame-src 'self'; base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
+    "frame-src 'self'; manifest-src 'self'; base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
 )
 VIEW = (
     "<!doctype html><html data-view=drawn><title>view</title><script type=module src=/js/scene/frame.js></script>"

@@ -144,7 +144,7 @@ def test_what_only_engineers_read_is_behind_a_disclosure_that_tells_its_warnings
 
 
 def test_a_supervisor_makes_a_link_for_somebody_else(page: Page, server: PlayedServer) -> None:
-    server.answers["/api/invite"] = (200, {"ok": True, "reason": "", "link": "http://127.0.0.1:8000/sign-in?token=abc"})
+    server.answers["/api/invite"] = (200, {"ok": True, "reason": "", "link": f"{ORIGIN}/sign-in?token=abc", "qr": []})
     expect(page.locator("#invite-user")).to_be_hidden()
     page.locator("#person").click()
     page.locator("#invite").click()

@@ -95,6 +95,8 @@ FAMILIES: dict[str, Sequence[str]] = {
     "health.${}": ("robot", "camera"),
     "bar.${}": ("preview", "reset"),
     "bar.to_${}": ("review", "preview", "reset"),
+    "keys.${}": ("stop", "decide", "undo", "camera", "measure", "hold", "drive", "close", "help"),
+    "hint.${}": ("next", "screens", "stop", "person"),
     # What a message names.
     "name.${}": (
         *(event.value for event in Event),
@@ -181,7 +183,7 @@ UNSEEN = re.compile(
     r'undecidedList\(|-controls": |name: |const PARTS = |const DISABLED = |getAttribute\()$'
 )
 PROPER = {"Rolling Panda", "\0 · Rolling Panda", "\0 min \0 s", "\0 min", "\0 s", "\0 mm", "\0 / \0 s"}
-KEYS = {"H", "Escape", "Tab", "Enter", "Space", "Arrow"}
+KEYS = {"H", "Esc", "Escape", "Tab", "Enter", "Space", "Arrow"}
 MESSAGES = {
     struct.__name__ for struct in (*union_members(page_messages.FromServer), *union_members(page_messages.FromPage))
 }

@@ -5,10 +5,15 @@ import { link as serverLink, pageState } from "../js/state/page-state.js";
 import { reasonText } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
 import { labelOf, text } from "../js/state/texts.js";
-import { dropDown, element, setText } from "../js/views/dom.js";
+import { dropDown, element, setText, svg } from "../js/views/dom.js";
 
 /** @type {readonly import("../js/link/messages.js").Role[]} */
 const ROLES = Object.freeze(["viewer", "operator", "supervisor"]);
+
+/** White around a QR code, without which cameras do not find it (modules). */
+const QUIET = 4;
+/** Hosts that are each machine's name for itself. */
+const LOCAL = Object.freeze(["localhost", "127.0.0.1", "[::1]"]);
 
 class RpInvite extends HTMLElement {
   connectedCallback() {
@@ -37,7 +42,8 @@ class RpInvite extends HTMLElement {
       attributes: { type: "text", readonly: "", "aria-label": text("invite.link") },
     });
     const copy = element("button", { id: "invite-copy", text: text("invite.copy") });
-    const made = element("div", { class: "invite-made" }, link, copy);
+    const code = element("div", { class: "invite-code" });
+    const made = element("div", { class: "invite-made" }, code, link, copy);
     const form = element(
       "form",
       { id: "invitation", class: "invitation" },
@@ -56,6 +62,7 @@ class RpInvite extends HTMLElement {
       toggle.setAttribute("aria-expanded", String(open));
       // A link must not stay on the screen.
       link.value = "";
+      code.replaceChildren();
       made.hidden = true;
       setText(words, text("invite.how"));
     };
@@ -77,11 +84,13 @@ class RpInvite extends HTMLElement {
         setText(words, text("invite.refused", { why: reasonText(answer.why) }));
         return;
       }
-      // The server knows its local address; this page knows the one in use.
-      const path = new URL(answer.link);
-      link.value = `${location.origin}${path.pathname}${path.search}`;
+      link.value = answer.link;
       made.hidden = false;
-      setText(words, text("invite.made", { user: user.value.trim(), role: labelOf(role.value) }));
+      const name = user.value.trim();
+      const local = LOCAL.includes(location.hostname) ? ` ${text("invite.local")}` : "";
+      setText(words, text("invite.made", { user: name, role: labelOf(role.value) }) + local);
+      const what = element("p", { text: text(`invite.role.${role.value}`) });
+      code.replaceChildren(qrCode(answer.qr ?? [], text("invite.qr", { user: name })), what);
       link.select();
     });
     copy.addEventListener("click", async () => {
@@ -99,5 +108,15 @@ class RpInvite extends HTMLElement {
       if (!may && !form.hidden) show(false);
     });
   }
+}
+/**
+ * @param {readonly string[]} rows 1 is dark.
+ * @param {string} label
+ */
+function qrCode(rows, label) {
+  const side = rows.length + 2 * QUIET;
+  const dark = rows.flatMap((row, y) => [...row].map((module, x) => (module === "1" ? `M${x + QUIET} ${y + QUIET}h1v1h-1z` : "")));
+  const attributes = { class: "qr", viewBox: `0 0 ${side} ${side}`, role: "img", "aria-label": label };
+  return svg("svg", attributes, svg("path", { d: dark.join("") }));
 }
 customElements.define("rp-invite", RpInvite);

@@ -30,7 +30,8 @@ class RpLinkBanner extends HTMLElement {
       } else {
         setText(title, text("link.lost"));
         const old = age === null ? [] : [text("link.old", { age: ageWords(age) })];
-        setText(words, [...old, counted("link.tries", attempts)].join(" "));
+        const cause = navigator.onLine ? [] : [text("link.offline")];
+        setText(words, [...cause, ...old, counted("link.tries", attempts)].join(" "));
       }
       setText(hint, text("link.stop"));
     });

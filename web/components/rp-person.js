@@ -1,4 +1,4 @@
-// Who is signed in, and behind that name: inviting somebody, and signing out.
+// Who is signed in, and behind that name: inviting somebody, settings, help, and signing out.
 
 import { post } from "../js/link/api.js";
 import { pageState, say } from "../js/state/page-state.js";
@@ -8,6 +8,7 @@ import { counted, labelOf, text } from "../js/state/texts.js";
 import { element, setAttribute, setText } from "../js/views/dom.js";
 import { icon } from "../js/views/icons.js";
 import { menu } from "../js/views/menu.js";
+import { openHelp, openSettings } from "../js/views/sheets.js";
 import "./rp-invite.js";
 
 class RpPerson extends HTMLElement {
@@ -16,9 +17,19 @@ class RpPerson extends HTMLElement {
     const open = element("button", { id: "person", class: "quiet" }, icon("person"), name);
     const role = element("p", { class: "user-role" });
     const leave = element("button", { id: "sign-out", text: text("person.leave"), onclick: () => void signOut() });
-    const list = element("div", { id: "person-menu", class: "menu" }, role, document.createElement("rp-invite"), leave);
+    const settings = element("button", { id: "open-settings", text: text("settings.title") });
+    const help = element("button", { id: "open-help", text: text("help.title"), attributes: { "aria-keyshortcuts": "?" } });
+    const invite = document.createElement("rp-invite");
+    const list = element("div", { id: "person-menu", class: "menu" }, role, invite, settings, help, leave);
     this.append(open, list);
-    menu(open, list);
+    const show = menu(open, list);
+    for (const [button, opens] of /** @type {const} */ ([[settings, openSettings], [help, openHelp]])) {
+      button.addEventListener("click", () => {
+        show(false);
+        open.focus();
+        void opens();
+      });
+    }
     drawOn([pageState], () => {
       const state = pageState.get();
       setText(name, state?.user ?? "");

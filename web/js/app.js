@@ -27,9 +27,12 @@ import { initViewTools } from "./control/view-tools.js";
 import { socket } from "./link/socket.js";
 import { now } from "./state/page-state.js";
 import { initScreens } from "./state/screens.js";
+import { initCues } from "./views/cues.js";
 import { explainDisabled } from "./views/disabled-reasons.js";
 import { fillTexts } from "./views/dom.js";
 import { recordHistory } from "./views/history.js";
+import { initSheets } from "./views/sheets.js";
+import { keepAwake } from "./views/wake-lock.js";
 
 fillTexts(document);
 explainDisabled(document);
@@ -43,6 +46,9 @@ recordHistory();
 renewLease();
 initViewTools();
 followWork();
+initSheets(window);
+initCues(window);
+keepAwake(document);
 window.setInterval(() => now.set(performance.now()), 250);
 socket.open();
 if (multiRobot) {

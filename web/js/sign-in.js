@@ -3,6 +3,7 @@
 
 import { post } from "./link/api.js";
 import { reasonText } from "./state/reasons.js";
+import { hints } from "./state/settings.js";
 import { text } from "./state/texts.js";
 import { fillTexts } from "./views/dom.js";
 
@@ -33,6 +34,7 @@ async function signIn(body) {
   progress.className = "";
   const answer = await post("api/sign-in", body);
   if (answer.ok) {
+    if (hints.get() === "") hints.set("due");
     location.replace(location.pathname.replace(/sign-in$/, ""));
     return;
   }

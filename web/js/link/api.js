@@ -7,9 +7,10 @@ import { text } from "../state/texts.js";
 /** @typedef {import("../state/reasons.js").Reason} Reason */
 
 /**
- * `status` is 0 if the server was not reached; `why` may be what an accepted request does; `link` answers an invitation.
+ * `status` is 0 if the server was not reached; `why` may be what an accepted request does; `link` and the rows of `qr`
+ * answer an invitation.
  *
- * @typedef {{ ok: boolean, why: Reason|null, status: number, link?: string }} Answer
+ * @typedef {{ ok: boolean, why: Reason|null, status: number, link?: string, qr?: readonly string[] }} Answer
  */
 
 /**
@@ -81,7 +82,7 @@ export async function isSignedIn() {
 
 /**
  * @param {Response} response
- * @returns {Promise<{ ok: boolean, why: Reason|null, link?: string }>}
+ * @returns {Promise<Pick<Answer, "ok"|"why"|"link"|"qr">>}
  */
 async function answerOf(response) {
   /** @type {any} */
@@ -93,7 +94,7 @@ async function answerOf(response) {
   }
   const why = reasonIn(body);
   if (!response.ok) return { ok: false, why: why ?? reason("server_answered", { status: response.status }) };
-  return { ok: body?.ok !== false, why, link: typeof body?.link === "string" ? body.link : "" };
+  return { ok: body?.ok !== false, why, link: body?.link, qr: body?.qr };
 }
 
 /**

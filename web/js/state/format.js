@@ -2,6 +2,40 @@
 
 import { LANGUAGE, labelOf, text } from "./texts.js";
 
+/** Formats by their options, since one costs more to make than to use. @type {Map<string, Intl.NumberFormat>} */
+const FORMATS = new Map();
+
+/**
+ * @param {number} value
+ * @param {Intl.NumberFormatOptions} options
+ */
+function formatted(value, options) {
+  const key = JSON.stringify(options);
+  const format = FORMATS.get(key) ?? new Intl.NumberFormat(LANGUAGE, { useGrouping: false, ...options });
+  FORMATS.set(key, format);
+  return format.format(value);
+}
+
+/**
+ * A number in the language of the page.
+ *
+ * @param {number} value
+ * @param {number} digits After the decimal mark.
+ */
+export function decimal(value, digits) {
+  return formatted(value, { minimumFractionDigits: digits, maximumFractionDigits: digits });
+}
+
+/**
+ * A number in the language of the page.
+ *
+ * @param {number} value
+ * @param {number} digits Significant ones, at most.
+ */
+export function significant(value, digits) {
+  return formatted(value, { maximumSignificantDigits: digits });
+}
+
 /**
  * The nearest obstacle; empty if nothing is near.
  *
@@ -9,12 +43,12 @@ import { LANGUAGE, labelOf, text } from "./texts.js";
  */
 export function nearWords(controller) {
   const near = controller?.proximity ?? null;
-  return near === null ? "" : text("near", { distance: (near.distance * 1000).toFixed(0), what: labelOf(near.what) });
+  return near === null ? "" : text("near", { distance: decimal(near.distance * 1000, 0), what: labelOf(near.what) });
 }
 
 /** @param {number} seconds */
 export function ageWords(seconds) {
-  if (seconds < 99.5) return `${seconds.toFixed(1)} s`;
+  if (seconds < 99.5) return `${decimal(seconds, 1)} s`;
   if (seconds < 3600) return `${Math.floor(seconds / 60)} min`;
   return `${Math.floor(seconds / 3600)} h`;
 }
@@ -28,12 +62,12 @@ export function durationWords(seconds) {
 /** @param {number} metres */
 export function millimetres(metres) {
   const value = metres * 1000;
-  return value.toFixed(Math.abs(value) < 99.95 ? 1 : 0);
+  return decimal(value, Math.abs(value) < 99.95 ? 1 : 0);
 }
 
 /** @param {number} radians */
 export function degrees(radians) {
-  return (radians * (180 / Math.PI)).toFixed(1);
+  return decimal(radians * (180 / Math.PI), 1);
 }
 
 const CLOCK = new Intl.DateTimeFormat(LANGUAGE, { timeStyle: "medium", hourCycle: "h23" });
@@ -55,7 +89,7 @@ export function dateWords(wallTime) {
  * @param {number} force
  */
 export function newtons(force) {
-  return `${Number(force.toPrecision(2))} N`;
+  return `${significant(force, 2)} N`;
 }
 
 /**

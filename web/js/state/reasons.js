@@ -1,6 +1,7 @@
 // Reasons as text for people.
 
-import { REASONS, labelOf } from "./texts.js";
+import { decimal, significant } from "./format.js";
+import { REASONS, labelOf, text } from "./texts.js";
 
 /** @typedef {{code: string, values: readonly (readonly [string, string|number|Reason])[]}} Reason */
 
@@ -45,8 +46,8 @@ export function partsOf({ code, values = [] }) {
   if (!entry) return { text: [code, ...values.map(([name, value]) => `${name} ${shown(value, "")}`)].join(", "), act: "" };
   const [, template, act] = entry;
   const known = new Map(values);
-  const text = template.replace(/\{(\w+)(?::([^}]*))?\}/g, (_, name, format) => shown(known.get(name), format ?? ""));
-  return { text, act };
+  const told = template.replace(/\{(\w+)(?::([^}]*))?\}/g, (_, name, format) => shown(known.get(name), format ?? ""));
+  return { text: told, act };
 }
 
 /**
@@ -57,8 +58,8 @@ export function partsOf({ code, values = [] }) {
  */
 export function reasonText(reason) {
   if (!reason) return "";
-  const { text, act } = partsOf(reason);
-  return act ? `${text}: ${act}` : text;
+  const told = partsOf(reason);
+  return told.act ? text("advice", { text: told.text, act: told.act }) : told.text;
 }
 
 /**
@@ -80,5 +81,5 @@ function shown(value, format) {
   if (typeof value === "string") return labelOf(value);
   if (typeof value === "object") return reasonText(value);
   const digits = /^\.(\d)f$/.exec(format);
-  return digits ? value.toFixed(Number(digits[1])) : String(Number(value.toPrecision(format === "g" ? 6 : 12)));
+  return digits ? decimal(value, Number(digits[1])) : significant(value, format === "g" ? 6 : 12);
 }

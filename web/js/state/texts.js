@@ -1,11 +1,16 @@
 // Words of the page, from `text/page.LANGUAGE.json` and `text/reasons.LANGUAGE.json`.
 
 import { LANGUAGES } from "./languages.js";
+import { dress, language } from "./settings.js";
 
-/** The first of the browser's languages that there are texts in. */
+/** The language chosen on this page, or the first of the browser's that there are texts in. */
 export const LANGUAGE =
-  navigator.languages.flatMap((each) => [each, each.split("-")[0] ?? ""]).find((each) => LANGUAGES.includes(each)) ?? "en";
+  [language.get(), ...navigator.languages.flatMap((each) => [each, each.split("-")[0] ?? ""])].find((each) =>
+    LANGUAGES.includes(each),
+  ) ?? "en";
 document.documentElement.lang = LANGUAGE;
+// Before the first words are shown.
+dress(document.documentElement);
 
 /**
  * A catalogue of texts. Without it the page shows the keys, since it has to stop the robot all the same.
