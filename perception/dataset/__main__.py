@@ -1,7 +1,7 @@
 """Labelled pictures of a vineyard, from and for other labelling programs.
 
-import  reads COCO, CVAT for images, labelme, VGG Image Annotator or masks, and writes a dataset
-export  writes a dataset for COCO, CVAT or labelme
+import  reads COCO, CVAT for images, labelme, VGG Image Annotator, masks or episodes, and writes a dataset
+export  writes a dataset for COCO, CVAT or labelme, or as episodes
 check   loads every picture and mask of a dataset, and tells what it holds
 """
 
@@ -12,7 +12,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from perception.dataset.annotations import WRITERS, Annotated, find_picture, paint, read_annotations
+from perception.dataset.annotations import (
+    WRITERS,
+    Annotated,
+    find_picture,
+    paint,
+    read_annotations,
+)
 from perception.dataset.dataset import (
     PICTURES,
     VALUES,
@@ -29,8 +35,10 @@ from perception.dataset.dataset import (
     stored_size,
     write_manifest,
 )
+from perception.dataset.episodes import is_episodes, read_episodes, write_episodes
 from rolling_panda.errors import InputError, RollingPandaError
 
+_WRITERS = WRITERS | {"episodes": write_episodes}
 #: Default share of pictures that are held out, to compare models on.
 _HELD_OUT = 0.2
 
@@ -107,7 +115,7 @@ def dataset_parser(
     give.set_defaults(run=_export)
     give.add_argument("dataset", type=Path, metavar="DIR")
     give.add_argument("out", type=Path, metavar="OUT", help="new folder: pictures and labels")
-    give.add_argument("--format", choices=sorted(WRITERS), required=True)
+    give.add_argument("--format", choices=sorted(_WRITERS), required=True)
     look = commands.add_parser("check", help="load every picture and mask")
     look.set_defaults(run=_check)
     look.add_argument("dataset", type=Path, metavar="DIR")
@@ -118,7 +126,9 @@ def _import(arguments: argparse.Namespace) -> None:
     if not 0.0 <= arguments.held_out <= 1.0:
         raise InputError(f"--held-out {arguments.held_out}: give a share from 0 to 1")
     classes = [name.strip() for name in arguments.classes.split(",")] if arguments.classes else []
-    annotated = sorted(read_annotations(arguments.labels, classes), key=lambda each: each.name)
+    episodes = is_episodes(arguments.labels)
+    read = read_episodes(arguments.labels) if episodes else read_annotations(arguments.labels, classes)
+    annotated = sorted(read, key=lambda each: each.name)
     vocabulary = VOCABULARIES.get(arguments.names, Vocabulary({}, "far"))
     values = _values(annotated, vocabulary, arguments.map)
     rest = VALUES[arguments.rest or vocabulary.rest]
@@ -136,7 +146,7 @@ def _import(arguments: argparse.Namespace) -> None:
                     f"{source} has {size[0]}×{size[1]}. Label the picture as it is now"
                 )
             labels = paint(each, values, rest, size)
-            split: Split = "train" if number < first_held_out else "held-out"
+            split: Split = each.split or ("train" if number < first_held_out else "held-out")
             name = add_picture(folder, "_".join(source.relative_to(pictures).parts), source, labels)
             entries.append(Entry(name, split))
         write_manifest(folder, Manifest(arguments.source, arguments.licence, tuple(entries)))
@@ -177,9 +187,10 @@ def _export(arguments: argparse.Namespace) -> None:
     check(dataset)
     with new_folder(arguments.out) as folder:
         shutil.copytree(dataset.folder / PICTURES, folder / PICTURES)
-        names = [entry.name for entry in dataset.manifest.pictures]
-        WRITERS[arguments.format](folder, [(name, dataset.load(name)[1]) for name in names])
-    print(f"{len(names)} pictures for {arguments.format} in {arguments.out}")
+        entries = dataset.manifest.pictures
+        write = _WRITERS[arguments.format]
+        write(folder, [(entry.name, dataset.load(entry.name)[1], entry.split) for entry in entries])
+    print(f"{len(entries)} pictures for {arguments.format} in {arguments.out}")
 
 
 def _check(arguments: argparse.Namespace) -> None:

@@ -20,7 +20,7 @@ from PIL import Image
 from skimage.draw import polygon as fill
 
 from perception.arrays import Labels, Mask
-from perception.dataset.dataset import PICTURE_SUFFIXES, VALUES, load_values
+from perception.dataset.dataset import PICTURE_SUFFIXES, VALUES, Split, load_values
 from rolling_panda.errors import InputError
 
 #: A polygon may leave its picture by this share of a side, as when a hand slips; what is outside is cut off.
@@ -47,12 +47,14 @@ class Annotated:
         size: Width and height that the file tells (px); None where it tells none.
         shapes: In the order of drawing: later ones lie above.
         file: Where this is written, for messages.
+        split: What the picture is for, if the file tells.
     """
 
     name: str
     size: tuple[int, int] | None
     shapes: tuple[Shape, ...]
     file: Path
+    split: Split | None = None
 
 
 def read_annotations(path: Path, classes: Sequence[str] = ()) -> list[Annotated]:
@@ -345,8 +347,8 @@ def find_picture(folder: Path, name: str) -> Path:
     raise InputError(f"{path} is missing; give the folder of the pictures with --pictures")
 
 
-#: A picture to export: its file's name and its mask values.
-Exported = tuple[str, Labels]
+#: A picture to export: its file's name, its mask values, and what it is for.
+Exported = tuple[str, Labels, Split]
 
 
 def parts(labels: Labels) -> Iterator[tuple[str, Mask]]:
@@ -361,7 +363,7 @@ def write_coco(folder: Path, pictures: Sequence[Exported]) -> None:
     numbers = {name: value + 1 for name, value in VALUES.items() if name not in ("far", "unlabelled")}
     images: list[dict[str, Any]] = []
     annotations: list[dict[str, Any]] = []
-    for number, (name, labels) in enumerate(pictures, 1):
+    for number, (name, labels, _) in enumerate(pictures, 1):
         height, width = labels.shape
         images.append({"id": number, "file_name": name, "width": width, "height": height})
         for label, mask in parts(labels):
@@ -387,7 +389,7 @@ def write_cvat(folder: Path, pictures: Sequence[Exported]) -> None:
     """`annotations.xml`, CVAT for images 1.1, with a mask for each class of a picture."""
     root = ElementTree.Element("annotations")
     ElementTree.SubElement(root, "version").text = "1.1"
-    for number, (name, labels) in enumerate(pictures):
+    for number, (name, labels, _) in enumerate(pictures):
         height, width = labels.shape
         size = {"width": str(width), "height": str(height)}
         image = ElementTree.SubElement(root, "image", {"id": str(number), "name": name, **size})
@@ -400,7 +402,7 @@ def write_cvat(folder: Path, pictures: Sequence[Exported]) -> None:
 
 def write_labelme(folder: Path, pictures: Sequence[Exported]) -> None:
     """A JSON file for each picture, with a mask for each class; for labelme 5.3 or later."""
-    for name, labels in pictures:
+    for name, labels, _ in pictures:
         height, width = labels.shape
         shapes: list[dict[str, Any]] = []
         for label, mask in parts(labels):

@@ -121,7 +121,7 @@ def test_what_is_exported_is_read_back_pixel_by_pixel(tmp_path, kind):
     labels[8:60, 3:70] = rng.choice([FAR, CANE, TRUNK, NODE], (52, 67))
     labels[0, 0] = labels[-1, -1] = CORDON
     empty = np.full((70, 65), FAR, np.uint8)
-    WRITERS[kind](tmp_path, [("a.jpg", labels), ("b.png", empty)])
+    WRITERS[kind](tmp_path, [("a.jpg", labels, "train"), ("b.png", empty, "held-out")])
     (single,) = [path for path in tmp_path.iterdir()] if kind != "labelme" else [tmp_path]
     read = read_annotations(single)
     assert [each.size for each in read] == [(80, 64), (65, 70)]

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -223,3 +224,75 @@ def test_a_damaged_dataset_is_named(vines, tmp_path, capsys):
     assert "dataset.json" in capsys.readouterr().err
     assert main(["export", str(tmp_path), str(tmp_path / "no"), "--format", "coco"]) == 1
     assert not (tmp_path / "no").exists()
+
+
+def exported(vines, tmp_path) -> tuple[Dataset, Path]:
+    """A dataset with unlabelled pixels, and the same as episodes."""
+    first = imported(vines, tmp_path / "first", "--held-out", "0.34", "--rest", "unlabelled")
+    out = tmp_path / "episodes"
+    assert main(["export", str(first.folder), str(out), "--format", "episodes"]) == 0
+    return first, out
+
+
+def test_episodes_keep_pictures_masks_and_split(vines, tmp_path):
+    first, out = exported(vines, tmp_path)
+    second = imported(out, tmp_path / "second")
+    for split, count in (("train", 4), ("held-out", 2)):
+        before, after = first.names(split), second.names(split)
+        assert len(before) == count and [name.removeprefix("pictures_") for name in after] == before
+        for one, other in zip(before, after, strict=True):
+            for kept, came in zip(first.load(one), second.load(other), strict=True):
+                np.testing.assert_array_equal(kept, came)
+    assert (second.load(second.names("train")[0])[1] == UNLABELLED).any()
+
+
+def test_the_episodes_have_the_files_and_the_counts_of_lerobot(vines, tmp_path):
+    _, out = exported(vines, tmp_path)
+    info = json.loads((out / "meta" / "info.json").read_text())
+    assert (info["total_episodes"], info["total_frames"]) == (2, 6)
+    assert info["splits"] == {"train": "0:1", "held-out": "1:2"}
+    assert info["features"]["observation.images.camera"]["shape"] == [64, 96, 3]
+    lengths = [json.loads(line)["length"] for line in (out / "meta" / "episodes.jsonl").read_text().splitlines()]
+    frames = [
+        [
+            json.loads(line)
+            for line in (out / info["data_path"].format(episode_chunk=0, episode_index=k)).read_text().splitlines()
+        ]
+        for k in range(2)
+    ]
+    assert lengths == [len(each) for each in frames] == [4, 2]
+    assert [frame["index"] for each in frames for frame in each] == list(range(6))
+    assert all((out / frame["observation.images.labels"]).is_file() for each in frames for frame in each)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "says"),
+    [
+        (lambda out: _rewrite(out / "meta/info.json", ".jsonl", ".parquet"), "not Parquet and video"),
+        (lambda out: _rewrite(out / "meta/info.json", '"total_frames": 6', '"total_frames": 7'), "has 6 frames"),
+        (lambda out: (out / "data/chunk-000/episode_000001.jsonl").unlink(), "episode_000001.jsonl"),
+        (lambda out: (out / "masks/v0.png").unlink(), "v0.png is missing"),
+        (lambda out: (out / "pictures/v0.jpg").unlink(), "v0.jpg is missing"),
+        (lambda out: _rewrite(out / "data/chunk-000/episode_000000.jsonl", "masks/v0", "../v0"), "is outside"),
+        (lambda out: _rewrite(out / "meta/info.json", '"cane": 6', '"cane": 60'), "holds the value 6"),
+    ],
+)
+def test_damaged_episodes_are_refused(vines, tmp_path, capsys, spoil, says):
+    _, out = exported(vines, tmp_path)
+    capsys.readouterr()
+    spoil(out)
+    assert says in refused(capsys, out)
+
+
+def test_pictures_of_several_sizes_are_no_episodes(vines, tmp_path, capsys):
+    picture(vines / "v9.jpg", (128, 96))
+    labelled(vines, "v9.jpg", size=(128, 96))
+    data = imported(vines, tmp_path / "first")
+    assert main(["export", str(data.folder), str(tmp_path / "no"), "--format", "episodes"]) == 1
+    assert "128×96" in capsys.readouterr().err and not (tmp_path / "no").exists()
+
+
+def _rewrite(path: Path, old: str, new: str) -> None:
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
