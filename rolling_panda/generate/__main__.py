@@ -9,7 +9,7 @@ from pathlib import Path
 from rolling_panda.errors import RollingPandaError
 from rolling_panda.generate import guides, languages, safety
 from rolling_panda.generate.javascript import messages_module, messages_types, reasons_catalogue
-from rolling_panda.generate.markdown import fill, reasons_table
+from rolling_panda.generate.markdown import fill, guide_table, reasons_table
 from rolling_panda.transport.access import access_control
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -23,7 +23,7 @@ _ROUTER_HEADER = """\
 def generated(root: Path = ROOT) -> dict[Path, str]:
     """The text of each generated file of a checkout."""
     wire, safety_page = root / "docs" / "wire.md", root / "docs" / "safety.md"
-    reasons_page = root / "docs" / "reasons.md"
+    reasons_page, guide = root / "docs" / "reasons.md", root / "docs" / "operator-guide.md"
     reasons_blocks = {"reasons": reasons_table}
     return {
         root / "web" / "js" / "link" / "messages.js": messages_module(),
@@ -33,6 +33,7 @@ def generated(root: Path = ROOT) -> dict[Path, str]:
         root / "assets" / "config" / "router.json5": router_config(),
         wire: fill(wire.read_text(encoding="utf-8")),
         reasons_page: fill(reasons_page.read_text(encoding="utf-8"), reasons_blocks, "docs/reasons.md"),
+        guide: fill(guide.read_text(encoding="utf-8"), {"commands": guide_table}, "docs/operator-guide.md"),
         safety_page: fill(safety_page.read_text(encoding="utf-8"), safety.BLOCKS, "docs/safety.md"),
     } | guides.guides(root)
 

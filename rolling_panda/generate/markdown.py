@@ -1,5 +1,6 @@
-"""The generated blocks of `docs/wire.md` and `docs/reasons.md`, between markers."""
+"""The generated blocks of `docs/wire.md`, `docs/reasons.md` and `docs/operator-guide.md`, between markers."""
 
+import json
 import re
 from collections.abc import Callable, Iterable, Mapping
 from typing import Annotated, Any, Literal, get_args, get_origin
@@ -11,8 +12,10 @@ from rolling_panda.commands import COMMANDS, Command
 from rolling_panda.errors import MessageError
 from rolling_panda.generate.description import alias_name, aliases, describe, is_union, reachable, union_members
 from rolling_panda.messages import page as page_messages
+from rolling_panda.messages.types import Mode
 from rolling_panda.mode_table import ROWS
 from rolling_panda.reasons import CATALOGUE
+from rolling_panda.resources import resource
 from rolling_panda.topics import SERVICES, TOPICS
 
 _BLOCK = re.compile(r"(<!-- generated: ([a-z-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
@@ -106,6 +109,23 @@ def commands_table() -> str:
         for command in COMMANDS
     ]
     return table(("command", "route", "least right", "modes", "conditions"), rows)
+
+
+def guide_table() -> str:
+    """One row for each command, in the words of the page."""
+    texts = json.loads(resource("web/text/page.en.json").read_text(encoding="utf-8"))
+    modes = {mode: f"*{texts[f'mode.{mode}']}*" for mode in get_args(Mode)}
+    names = re.compile(rf"\b({'|'.join(modes)})\b")
+    rows = [
+        (
+            command.words.capitalize(),
+            names.sub(lambda found: modes[found[0]], describe(command.message).about.replace("\n", " ")),
+            "person in control" if command.control else command.role,
+            ", ".join(modes[mode] for mode in _modes(command)) or "every",
+        )
+        for command in COMMANDS
+    ]
+    return table(("command", "what it does", "who", "modes"), rows)
 
 
 def _modes(command: Command) -> tuple[str, ...]:
