@@ -10,7 +10,7 @@ from pathlib import Path, PurePosixPath
 
 from starlette.responses import Response
 from starlette.staticfiles import StaticFiles
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.types import Scope
 
 #: A JSDoc type cast beside code; the cast expression follows in parentheses.
 _TYPE = re.compile(r"/\*\* @type [^*`]*\*/ ?")
@@ -61,17 +61,9 @@ class PageFiles(StaticFiles):
             return Response(status_code=304, headers=headers)
         return Response(self._cache[name], media_type=_MEDIA_TYPES[PurePosixPath(name).suffix], headers=headers)
 
-    def before(self, app: ASGIApp) -> ASGIApp:
-        """`app` with the cached scripts and stylesheet served first, since matching its many routes costs more."""
-        paths = {f"/{name}" for name in self._cache if not name.endswith(".html")}
-
-        async def dispatch(scope: Scope, receive: Receive, send: Send) -> None:
-            if scope["type"] == "http" and scope["method"] in ("GET", "HEAD") and scope["path"] in paths:
-                await self.cached(scope["path"][1:], scope)(scope, receive, send)
-            else:
-                await app(scope, receive, send)
-
-        return dispatch
+    def holds(self, path: str) -> bool:
+        """Whether a path of the page is that of a cached script or stylesheet."""
+        return not path.endswith(".html") and path[1:] in self._cache
 
 
 def with_preloads(page: str, scripts: dict[str, str]) -> str:
