@@ -5,7 +5,7 @@ An episode is a split of the dataset, and each frame has a picture and its mask.
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Literal
+from typing import Final, Literal
 
 import msgspec
 import numpy as np
@@ -18,7 +18,7 @@ from rolling_panda.errors import InputError
 _CAMERA, _LABELS = "observation.images.camera", "observation.images.labels"
 _TASK = "label the wood of vines"
 _VERSION = "v2.1"
-_DATA = "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.jsonl"
+_DATA: Final = "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.jsonl"
 _SPLITS: tuple[Split, ...] = ("train", "held-out")
 
 
@@ -77,7 +77,8 @@ def write_episodes(folder: Path, pictures: Sequence[Exported]) -> None:
         )
     (folder / MASKS).mkdir()
     episodes = [kept for split in _SPLITS if (kept := [each for each in pictures if each[2] == split])]
-    lines, splits, index = [], {}, 0
+    splits: dict[str, str] = {}
+    lines, index = [], 0
     for number, episode in enumerate(episodes):
         frames = []
         for at, (name, labels, _) in enumerate(episode):
