@@ -4,6 +4,7 @@ Supervision (`controller/supervision/supervisor.py`) decides whether the robot m
 how it moves, the queue what is cut. `Controller` calls them in order for each period and each request.
 """
 
+import functools
 import math
 from collections.abc import Callable, Iterable
 
@@ -238,7 +239,7 @@ class Controller:
             intents.Resume: self._change_mode,
             intents.Acknowledge: self._change_mode,
             intents.Start: self._start,
-            intents.Survey: self._start,
+            intents.Survey: self._survey,
             intents.LookAgain: self._look_again,
             intents.Pause: self._pause,
             intents.Home: self._home,
@@ -326,17 +327,23 @@ class Controller:
         return self._supervisor.event(command.event, now, reason, authority.rights(client, asked.role))
 
     def _start(self, asked: intents.Start, now: float) -> m.Reason | None:
+        return self._begin(asked, now, self._movement.sequence.start)
+
+    def _survey(self, asked: intents.Survey, now: float) -> m.Reason | None:
+        return self._begin(asked, now, functools.partial(self._movement.sequence.survey, asked.distance))
+
+    def _look_again(self, asked: intents.LookAgain, now: float) -> m.Reason | None:
+        place = open_place(self._queue.perceived, asked.vine, asked.spur)
+        if place is None:
+            return reasons.site_unknown(asked.vine, asked.spur)
+        return self._begin(asked, now, functools.partial(self._movement.sequence.survey, place=place))
+
+    def _begin(self, asked: intents.Start, now: float, work: Callable[[], None]) -> m.Reason | None:
         refused = self._change_mode(asked, now)
         if refused is None:
             self._previews.start()
-            survey = asked if isinstance(asked, intents.Survey | intents.LookAgain) else None
-            self._movement.sequence.start(survey)
+            work()
         return refused
-
-    def _look_again(self, asked: intents.LookAgain, now: float) -> m.Reason | None:
-        if open_place(self._queue.perceived, asked.vine, asked.spur) is None:
-            return reasons.site_unknown(asked.vine, asked.spur)
-        return self._start(asked, now)
 
     def _pause(self, asked: intents.Pause, now: float) -> m.Reason | None:
         if not self._movement.homing:

@@ -3,6 +3,7 @@
 import copy
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from msgspec.structs import replace
@@ -116,6 +117,14 @@ class Perception:
         """Points withdrawn by the last frame, with the reasons."""
         self.obstacles: tuple[Capsule, ...] = ()
         """Obstacle map with the retained canes."""
+        self._handlers: dict[type[PlantRequest], Callable[[Any], m.Answer]] = {
+            SetRule: self._set_rule,
+            EvaluateRule: self._try_rule,
+            UndoRule: self._undo_rule,
+            MovePoint: self._move,
+            AddPoint: self._add,
+            AddPointInImage: self._add_in_image,
+        }
 
     def process(self, frame: CameraFrame) -> m.PruningPoints:
         """Process one frame; returns all points.
@@ -215,23 +224,8 @@ class Perception:
     def answer(self, request: PlantRequest) -> m.Answer:
         """Execute a request of an operator; a refused one changes nothing."""
         self.withdrawn = ()
-        if isinstance(request, SetRule):
-            return self._set_rule(request)
-        if isinstance(request, EvaluateRule):
-            return self._try_rule(request)
-        if isinstance(request, UndoRule):
-            return self._undo_rule(request)
-        if isinstance(request, MovePoint):
-            return self._move(request)
-        if isinstance(request, AddPoint):
-            return self._add(Ray(np.array(request.origin), np.array(request.direction)), request.user)
-        if isinstance(request, AddPointInImage):
-            at = request.sequence, request.u, request.v
-            ray = self._spur_pictures.ray(*at) or self.camera_rays.ray(*at, self._model)
-            if ray is None:
-                return _refused(reasons.picture_too_old())
-            return self._add(ray, request.user)
-        return _refused(reasons.request_unknown(type(request).__name__))
+        handler = self._handlers.get(type(request))
+        return _refused(reasons.request_unknown(type(request).__name__)) if handler is None else handler(request)
 
     def points(self) -> m.PruningPoints:
         """All points, undecided sites and canes; the pictures are brought up to date."""
@@ -270,7 +264,15 @@ class Perception:
             for point, wire, cordon in zip(points, wires, cordons, strict=True)
         )
 
-    def _add(self, ray: Ray, user: str) -> m.Answer:
+    def _add(self, request: AddPoint) -> m.Answer:
+        return self._place(Ray(np.array(request.origin), np.array(request.direction)), request.user)
+
+    def _add_in_image(self, request: AddPointInImage) -> m.Answer:
+        at = request.sequence, request.u, request.v
+        ray = self._spur_pictures.ray(*at) or self.camera_rays.ray(*at, self._model)
+        return _refused(reasons.picture_too_old()) if ray is None else self._place(ray, request.user)
+
+    def _place(self, ray: Ray, user: str) -> m.Answer:
         length = float(np.linalg.norm(ray.direction))
         if length < _MIN_NORM:
             return _refused(reasons.ray_without_direction())

@@ -69,21 +69,20 @@ class Teleoperation:
 
     def step(self, robot: Measured) -> Tracking:
         """One period of the held motion."""
-        message = self._message
-        assert message is not None
-        xi, speed_scale = np.zeros(NXI), message.speed_scale * latency_speed_scale(message.round_trip_s)
-        if message.joints is not None:
+        message, xi = self._message, np.zeros(NXI)
+        if message is None:
+            return self._follower.jog(xi, robot)
+        speed_scale = message.speed_scale * latency_speed_scale(message.round_trip_s)
+        base = None if message.base is None else self._driven(message.base, speed_scale)
+        if self._goal is not None:
+            if base is None:
+                return self._follower.seek(self._goal, self._posture, robot, self._config, speed_scale)
+            return self._follower.carry(self._goal, *base, robot, self._config, speed_scale)
+        if base is not None:
+            xi[:2] = self._drive.wheels(*base)
+        elif message.joints is not None:
             xi[ARM_XI] = speed_scale * np.array(message.joints)
-            return self._follower.jog(xi, robot)
-        if self._goal is None:
-            assert message.base is not None
-            xi[:2] = self._drive.wheels(*self._driven(message.base, speed_scale))
-            return self._follower.jog(xi, robot)
-        if message.base is None:
-            return self._follower.seek(self._goal, self._posture, robot, self._config, speed_scale)
-        return self._follower.carry(
-            self._goal, *self._driven(message.base, speed_scale), robot, self._config, speed_scale
-        )
+        return self._follower.jog(xi, robot)
 
     def _driven(self, base: BaseVelocity, speed_scale: float) -> tuple[float, float]:
         """Forward velocity (m/s) and yaw rate (rad/s), slowed alike until no wheel is too fast to brake in time."""

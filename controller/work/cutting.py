@@ -26,7 +26,6 @@ from controller.work.point_queue import TOLD_MOVED, PointQueue
 from controller.work.posture_search import CutPlan, Known, NextCut, Permit, PostureSearch, Unreachable, escape_pose
 from controller.work.step_result import StepResult
 from controller.work.survey import Survey
-from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.messages.perception import CloseUpResult
@@ -747,15 +746,18 @@ class CutSequence:
         """Whether a cut has been asked for and how it ends is not known yet: the blades may be closing."""
         return self._parts.blades.busy
 
-    def start(self, survey: intents.Survey | intents.LookAgain | None = None) -> None:
-        """Start with getting the tool clear of the canes, or a survey."""
-        parts = self._parts
+    def start(self) -> None:
+        """Start with getting the tool clear of the canes."""
         # Since a plan was made the robot may have been moved by hand.
+        self._parts.next_cut.forget()
+        self._stage = Escape(self._parts)
+
+    def survey(self, distance: float = 0.0, place: m.UndecidedSite | None = None) -> None:
+        """Start a survey of this length (m), or of one site."""
+        parts = self._parts
         parts.next_cut.forget()
-        if survey is None:
-            self._stage = Escape(parts)
-        else:
-            self._stage = Surveying(parts, Survey(parts.config, parts.follower, parts.saturation, parts.queue, survey))
+        survey = Survey(parts.config, parts.follower, parts.saturation, parts.queue, distance, place)
+        self._stage = Surveying(parts, survey)
 
     def finish_cut_and_pause(self, why: m.Reason | None) -> None:
         """With a reason: begin no further cut, leave the canes and pause. None continues the work."""

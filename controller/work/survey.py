@@ -14,7 +14,6 @@ from controller.whole_body.saturation import Saturation
 from controller.work.homing import Homing
 from controller.work.point_queue import PointQueue
 from controller.work.step_result import StepResult
-from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.model.differential_drive import NXI, Array
@@ -40,7 +39,8 @@ class Survey:
         follower: Follower,
         saturation: Saturation,
         queue: PointQueue,
-        asked: intents.Survey | intents.LookAgain | None = None,
+        distance: float = 0.0,
+        place: m.UndecidedSite | None = None,
     ) -> None:
         """Bind the parts.
 
@@ -49,16 +49,14 @@ class Survey:
             follower: Follower for motions of arm and base.
             saturation: Braking to rest.
             queue: The queue with perception's points.
-            asked: Distance ahead along the row, or the site to survey.
+            distance: Ahead along the row (m).
+            place: The site to look at again, in place of a way along the row.
         """
         self._config, self._follower, self._saturation, self._queue = config, follower, saturation, queue
         self._homing: Homing | None = Homing(config, follower, 1.0 / config.rate_hz)
         c, s = math.cos(config.work.row_heading), math.sin(config.work.row_heading)
         self._along, self._left = np.array([c, s]), np.array([-s, c])
-        self._distance = asked.distance if isinstance(asked, intents.Survey) else 0.0
-        self._place = (
-            open_place(queue.perceived, asked.vine, asked.spur) if isinstance(asked, intents.LookAgain) else None
-        )
+        self._distance, self._place = distance, place
         self._line: tuple[float, float] | None = None
         self._goal = 0.0
         self._stops: list[float] = []

@@ -270,11 +270,6 @@ class Scene:
             remove_camera_view(client, cloud="cloud" not in layers, frustum="camera" not in layers)
 
     @property
-    def view_count(self) -> int:
-        """Number of open views."""
-        return len(self._server.get_clients())
-
-    @property
     def shows_camera_frames(self) -> bool:
         """Whether any view shows the frustum or the point cloud of the eye-in-hand camera."""
         owners = {self.views.owner(client_id) for client_id in self._server.get_clients()}

@@ -118,12 +118,13 @@ def admit(frame: bytes, may_operate: bool, may_move: bool = True) -> Admitted | 
         return None
     if not may_operate and not isinstance(message, ViewerCamera):
         return None
-    if isinstance(message, GizmoUpdate):
-        return Admitted(b"", message if may_move else None)
-    if isinstance(message, GizmoDragEnd):
-        return Admitted(b"", message)
-    if isinstance(message, GizmoDragStart):
-        return Admitted(b"")
+    match message:
+        case GizmoUpdate():
+            return Admitted(b"", message if may_move else None)
+        case GizmoDragEnd():
+            return Admitted(b"", message)
+        case GizmoDragStart():
+            return Admitted(b"")
     # Encoded again, so that viser reads exactly what was checked here.
     return Admitted(_ENCODER.encode(message))
 
