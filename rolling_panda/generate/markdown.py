@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Annotated, Any, Literal, get_args, get_origin
 
 import msgspec
@@ -20,6 +20,8 @@ from rolling_panda.topics import SERVICES, TOPICS
 
 _BLOCK = re.compile(r"(<!-- generated: ([a-z-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
 _VALUE = re.compile(r"\{[^}]*\}")
+#: Who may cause a change of mode, in words.
+_RIGHTS = {"holder": "person in control", "operator": "operator", "supervisor": "supervisor"}
 _PLAIN: dict[Any, str] = {
     bool: "bool",
     int: "int",
@@ -120,12 +122,21 @@ def guide_table() -> str:
         (
             command.words.capitalize(),
             names.sub(lambda found: modes[found[0]], describe(command.message).about.replace("\n", " ")),
-            "person in control" if command.control else command.role,
+            "; ".join(_who(command, modes)),
             ", ".join(modes[mode] for mode in _modes(command)) or "every",
         )
         for command in COMMANDS
     ]
     return table(("command", "what it does", "who", "modes"), rows)
+
+
+def _who(command: Command, modes: Mapping[str, str]) -> Iterator[str]:
+    """Who may use a command; where the modes differ in that, by mode."""
+    rows = [row for row in ROWS if command.event is not None and row.event is command.event]
+    if len({row.who for row in rows}) > 1:
+        yield from (f"{_RIGHTS[row.who]} ({modes[row.before]})" for row in rows)
+    else:
+        yield "person in control" if command.control else command.role
 
 
 def _modes(command: Command) -> tuple[str, ...]:
