@@ -7,7 +7,7 @@ import schemathesis
 from schemathesis.engine import events, from_schema
 
 from rolling_panda import topics
-from rolling_panda.messages.perception import PointCrop
+from rolling_panda.messages.perception import DrawnCut, SpurDrawing, SpurPicture
 from rolling_panda.messages.robot import CameraFrame, Intrinsics
 from rolling_panda.messages.supervision import (
     ControlState,
@@ -39,6 +39,10 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore:Do not use the `random` module"),
     pytest.mark.filterwarnings("ignore:Generating overly large repr"),
 ]
+DRAWING = SpurDrawing(
+    vine=1, spur=1, image="ab" * 16, sequence=9, frame=(848, 480), window=(0, 0, 240, 180), size=(240, 180),
+    cuts=(DrawnCut(point_id="p1", revision=3, position=(9.0, 8.0), axis=((9.0, 8.0, 0.0),)),),
+)  # fmt: skip
 FRAME = CameraFrame(
     header=HEADER, sequence=7, intrinsics=Intrinsics(64, 48, 60.0, 60.0, 31.5, 23.5), base=PlanarPose(0.0, 0.0, 0.0),
     position=joints().position, color_jpeg=b"jpeg", depth_zlib=b"", depth_unit=0.001,
@@ -67,7 +71,7 @@ class Answering(FakeWire):
         self.deliver(topics.BRIDGE, bridge_state("s"))
         self.deliver(topics.CONTROLLER, controller_state())
         self.deliver(topics.POINTS, pruning_points(pruning_point()))
-        self.deliver(topics.CROPS, PointCrop(point_id="p1", revision=3, sequence=9, jpeg=b"jpeg"))
+        self.deliver(topics.PICTURES, SpurPicture(drawing=DRAWING, jpeg=b"jpeg"))
         self.deliver(topics.CAMERA, FRAME)
         self.deliver(topics.PLAN, SessionPlan(header=HEADER, state="planning"))
         self.deliver(topics.REPORT, SessionReport(began_at=1.0, written_at=2.0))
