@@ -14,7 +14,6 @@ from PIL import Image
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.messages.types import Vector3
 from rolling_panda.model.robot import RobotModel, configuration
-from rolling_panda.runtime.state_folder import replace_durably
 
 Moment = Literal["before", "after"]
 #: States of a point from the order to cut on.
@@ -135,7 +134,7 @@ class PictureFolder:
         self.folder, self._most = folder, most
 
     def keep(self, cut_id: str, moment: Moment, jpeg: bytes) -> None:
-        """Write a picture; it is on disk when this returns.
+        """Write a picture; an interruption leaves the old one or the new.
 
         Raises:
             OSError: It is not kept: the disk is full, or the folder cannot be written.
@@ -144,7 +143,14 @@ class PictureFolder:
         free = shutil.disk_usage(self.folder).free
         if free < _SPARE:
             raise OSError(f"{free >> 20} MB are free on the disk of {self.folder}, and {_SPARE >> 20} MB stay so")
-        replace_durably(self._path(cut_id, moment), jpeg)
+        # Not flushed to the disk: the ledger's flushes must not wait for it.
+        beside = self.folder / f".{cut_id}.{moment}.new"
+        try:
+            beside.write_bytes(jpeg)
+            beside.replace(self._path(cut_id, moment))
+        except OSError:
+            beside.unlink(missing_ok=True)
+            raise
         kept = sorted(self.folder.glob("*.jpg"), key=lambda each: each.stat().st_mtime)
         for oldest in kept[: -self._most]:
             oldest.unlink(missing_ok=True)

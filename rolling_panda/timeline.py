@@ -8,7 +8,7 @@ from rolling_panda.messages.types import LogEvent, Mode
 
 _MODES: Final = {mode: mode for mode in get_args(Mode)}
 _MODE = ("mode_changed", "robot_halted")
-_CUT: Final[dict[str, Literal["cut", "cut failed"]]] = {"cut_done": "cut", "cut_ended": "cut failed"}
+_CUT: Final[dict[str, Literal["cut", "failed_cut"]]] = {"cut_done": "cut", "cut_ended": "failed_cut"}
 _REFUSAL = ("command_refused", "teleoperation_refused")
 
 

@@ -529,7 +529,7 @@ class TimelineEvent(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     """
 
     at: WallTime
-    kind: Literal["mode", "cut", "cut failed", "refusal"]
+    kind: Literal["mode", "cut", "failed_cut", "refusal"]
     reason: Reason
     before: Mode | Literal[""] = ""
     mode: Mode | Literal[""] = ""

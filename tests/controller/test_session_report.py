@@ -85,7 +85,7 @@ def test_the_timeline_tells_modes_cuts_and_refusals_and_no_other_line():
     assert [(round(each.at - BEGAN, 3), each.kind, each.mode) for each in told.events] == [
         (0.0, "mode", "READY"),
         (2.0, "cut", ""),
-        (3.0, "cut failed", ""),
+        (3.0, "failed_cut", ""),
         (4.0, "refusal", ""),
         (5.0, "mode", "ESTOP_LATCHED"),
     ]

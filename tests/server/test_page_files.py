@@ -77,8 +77,8 @@ def test_the_page_asks_for_one_stylesheet_in_the_order_of_its_several_and_for_ev
     assert len(styles) > 10 and joined.body.decode() == "\n".join(styles)
     assert joined.headers["content-type"].startswith("text/css")
     named = re.findall(r'"modulepreload" href="(.*?)"', sent)
-    later = {"components/rp-charts.js", "components/rp-report.js", "components/rp-order.js", "components/rp-preview.js"}
-    assert "js/state/signals.js" in named and "components/rp-queue.js" in named and len(named) == len(set(named))
+    later = {f"components/rp-{name}.js" for name in ("review", "drive", "report", "engineer", "preview", "replay")}
+    assert "js/state/signals.js" in named and "components/rp-bar.js" in named and len(named) == len(set(named))
     assert not later & set(named), "what is fetched when it is wanted does not hold up what is seen first"
     without = re.sub(r' *<link rel="(stylesheet|modulepreload)".*\n', "", sent)
     assert without == re.sub(r' *<link rel="stylesheet".*\n', "", written), "and nothing else of it is changed"

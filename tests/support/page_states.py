@@ -1,5 +1,6 @@
 """Every state that the operator's page has, and how a played server brings it there: for tests, and for pictures."""
 
+import time
 from collections.abc import Callable
 from typing import get_args
 
@@ -19,9 +20,11 @@ from rolling_panda.messages.supervision import (
     SessionReport,
     StopRecord,
     StopState,
+    Timeline,
     VineReport,
 )
 from rolling_panda.reasons import said
+from rolling_panda.timeline import TimelineBuilder
 from server.api.responses import outcome
 from tests.support.page_parts import (
     accepted,
@@ -35,7 +38,7 @@ from tests.support.page_parts import (
     show_mode,
     working,
 )
-from tests.support.played_server import PlayedServer, bridge, controller, point
+from tests.support.played_server import PlayedServer, bridge, controller, cut_picture, point
 from tests.support.points import rolled_out
 
 State = Callable[[Page, PlayedServer], None]
@@ -322,10 +325,32 @@ def _refused(page: Page, server: PlayedServer) -> None:
     expect(page.locator(".toast")).to_be_visible()
 
 
+def a_timeline(began: float = MORNING) -> Timeline:
+    """Ten minutes of work with cuts, a pause, a stop and a refusal."""
+    lines: list[tuple[float, m.Reason]] = [
+        (5.0, reasons.mode_changed("IDLE", "READY", said("armed by Ada"))),
+        (40.0, reasons.command_refused("Bob", "start", reasons.control_held("Ada"))),
+        (60.0, reasons.mode_changed("READY", "AUTO", said("started by Ada"))),
+        *((70.0 + 12.0 * n, reasons.cut_done(f"p{n}", reasons.cut_and_gone())) for n in range(12)),
+        (220.0, reasons.cut_ended("p20", reasons.stands_not_cut(reasons.cutter_missed()))),
+        (230.0, reasons.robot_halted("AUTO", "PAUSED", said("a person beside the row"))),
+        (300.0, reasons.mode_changed("PAUSED", "READY", said("resumed by Ada"))),
+        (310.0, reasons.mode_changed("READY", "AUTO", said("started by Ada"))),
+        *((325.0 + 14.0 * n, reasons.cut_done(f"p{30 + n}", reasons.cut_and_gone())) for n in range(8)),
+        (450.0, reasons.robot_halted("AUTO", "ESTOP_LATCHED", said("stop button"))),
+        (520.0, reasons.mode_changed("ESTOP_LATCHED", "IDLE", said("reset by Ada"))),
+    ]
+    builder = TimelineBuilder()
+    for at, reason in lines:
+        builder.add(began + at, m.LogEvent(header=m.Header(), process="controller", reason=reason))
+    return builder.timeline(began, began + 600.0)
+
+
 def _replay(page: Page, server: PlayedServer) -> None:
     working(page, server)
-    server.replay = ReplayState(name="row.mcap", begins_at=1.8e9, duration_s=120.0, position_s=30.0, playing=True)
-    expect(page.locator("rp-replay")).to_be_visible()
+    server.timeline = a_timeline()
+    server.replay = ReplayState(name="row.mcap", begins_at=MORNING, duration_s=600.0, position_s=150.0, playing=True)
+    expect(page.locator("rp-replay .time-mark").first).to_be_visible()
 
 
 # --- sheets ----------------------------------------------------------------------------------------------------------
@@ -340,16 +365,26 @@ def _charts(page: Page, server: PlayedServer) -> None:
 def _empty_report(page: Page, server: PlayedServer) -> None:
     working(page, server)
     open_screen(page, "report")
-    expect(page.locator("rp-report section .hint").first).not_to_be_empty()
+    expect(page.locator("rp-report")).to_contain_text("Nothing has been cut yet.")
 
 
 def _report(page: Page, server: PlayedServer) -> None:
     working(page, server)
     outcomes: tuple[m.Outcome, ...] = ("DONE", "DONE", "FAILED_NOT_CUT", "DONE", "UNKNOWN")
+    why: dict[m.Outcome, m.Reason] = {
+        "DONE": reasons.cut_and_gone(),
+        "FAILED_NOT_CUT": reasons.stands_not_cut(reasons.cutter_missed()),
+        "UNKNOWN": reasons.interrupted(),
+    }
+    server.timeline = a_timeline(time.time() - 600.0)
+    for number, ended in enumerate(outcomes[:4], 1):
+        server.cut_pictures[f"c{number}", "before"] = cut_picture(False)
+        server.cut_pictures[f"c{number}", "after"] = cut_picture(ended == "DONE")
     cuts = tuple(
         CutReport(
             cut_id=f"c{number}", point_id=f"p{number}", vine=1 + number // 4, spur=1 + number % 4, outcome=outcome,
-            reason="", user="Ada", ended_at=MORNING + 60.0 + 5.0 * number, seconds=3.2 + 0.3 * number,
+            reason=why[outcome], user="Ada", ended_at=MORNING + 60.0 + 5.0 * number, seconds=3.2 + 0.3 * number,
+            wrong_by="Bob" if number == 2 else "",
         )
         for number, outcome in enumerate(outcomes, 1)
     )  # fmt: skip
@@ -364,7 +399,7 @@ def _report(page: Page, server: PlayedServer) -> None:
         control=(ControlReport(at=MORNING + 5.0, user="Ada", asked="TakeControl"),),
     )
     open_screen(page, "report")
-    expect(page.locator("rp-report tbody tr").first).to_be_visible()
+    expect(page.locator("rp-report .cut-card").first).to_be_visible()
 
 
 #: By name, in the order of a morning's work.

@@ -18,9 +18,10 @@ from rolling_panda import reasons
 from rolling_panda.commands import COMMANDS
 from rolling_panda.messages import page as page_messages
 from rolling_panda.messages import types as types_messages
-from rolling_panda.messages.supervision import ControlState, ReplayState, SessionReport, StopState
+from rolling_panda.messages.supervision import ControlState, ReplayState, SessionReport, StopState, Timeline
 from rolling_panda.reasons import said
 from rolling_panda.resources import resource
+from rolling_panda.topics import TOPICS
 from tests.support.fake_wire import bridge_state
 from tests.support.page_host import ORIGIN, PlayedRequest, PlayedSocket, page_host
 
@@ -137,6 +138,11 @@ class PlayedServer:
     crops_fetched: list[str] = field(default_factory=list)
     frames_fetched: list[int] = field(default_factory=list)
     report: SessionReport = field(default_factory=lambda: SessionReport(began_at=0.0, written_at=0.0))
+    timeline: Timeline = field(default_factory=lambda: Timeline(began_at=0.0, ended_at=0.0))
+    diagnostics: page_messages.Diagnostics = field(default_factory=lambda: diagnostics())
+    #: Pictures of cuts, by cut and moment.
+    cut_pictures: dict[tuple[str, str], bytes] = field(default_factory=dict)
+    pictures_fetched: list[tuple[str, str]] = field(default_factory=list)
     rule: m.PruningRule | None = field(default_factory=m.PruningRule)
     crop: bytes = field(default_factory=lambda: camera_image((240, 180)))
     view: bytes = b""
@@ -168,8 +174,14 @@ class PlayedServer:
             return JSONResponse({"arm_limits": [(-2.9, 2.9)] * 7})
         if path == "/api/sign-in":
             return JSONResponse({"password": False})
-        if path == "/api/report":
-            return Response(msgspec.json.encode(self.report), media_type="application/json")
+        for name, told in (("report", self.report), ("timeline", self.timeline), ("diagnostics", self.diagnostics)):
+            if path == f"/api/{name}":
+                return Response(msgspec.json.encode(told), media_type="application/json")
+        if path.startswith("/api/cuts/"):
+            _, _, _, cut_id, moment = path.removesuffix(".jpg").split("/")
+            picture = self.cut_pictures.get((cut_id, moment))
+            self.pictures_fetched.append((cut_id, moment))
+            return Response(picture, media_type="image/jpeg") if picture else Response(status_code=204)
         if path == "/viser/":
             return Response(STILL if self.view else self.frame, media_type="text/html")
         if path == "/viser/still.jpg":
@@ -254,6 +266,39 @@ class PlayedServer:
 
     def stops(self) -> list[Any]:
         return [body for path, body in self.posted if path == "/api/stop"]
+
+
+def diagnostics() -> page_messages.Diagnostics:
+    """Every topic at its rate, and every process of one version."""
+    traffic = (
+        page_messages.TopicTraffic(
+            name=topic.name,
+            sender=topic.sender,
+            nominal_hz=topic.rate_hz,
+            received=topic.read_by("server"),
+            count=1200,
+            rate_hz=topic.rate_hz or None,
+            age_s=0.5 / topic.rate_hz if topic.rate_hz else None,
+        )
+        if topic.read_by("server")
+        else page_messages.TopicTraffic(name=topic.name, sender=topic.sender, nominal_hz=topic.rate_hz, received=False)
+        for topic in TOPICS
+    )
+    programs = (m.Program(process=name, version="0.1.0", began_at=1.8e9) for name in m.PROCESSES)
+    return page_messages.Diagnostics(wall_time=1.8e9 + 5000.0, programs=tuple(programs), topics=tuple(traffic))
+
+
+def cut_picture(cut: bool) -> bytes:
+    """A cane before or after its cut, in the middle of the picture."""
+    image = Image.new("RGB", (320, 240), (150, 170, 160))
+    draw = ImageDraw.Draw(image)
+    draw.rectangle((0, 120, 320, 240), fill=(92, 108, 74))
+    draw.line((40, 0, 70, 240), fill=(120, 88, 60), width=14)
+    draw.line((160, 120 if cut else 0, 156, 240), fill=(168, 118, 66), width=11)
+    draw.line((0, 150, 320, 138), fill=(170, 175, 180), width=3)
+    out = BytesIO()
+    image.save(out, "JPEG")
+    return out.getvalue()
 
 
 @cache

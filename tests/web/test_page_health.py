@@ -2,13 +2,11 @@
 
 from typing import Any
 
-import msgspec
 import pytest
 from playwright.sync_api import Page, expect
 
 from rolling_panda import reasons
-from rolling_panda.messages.supervision import CutReport, RefusalReport, SessionReport, StopState, VineReport
-from tests.support.page_parts import open_screen
+from rolling_panda.messages.supervision import StopState
 from tests.support.played_page import box_of, until
 from tests.support.played_server import PlayedServer, bridge, controller, point
 
@@ -163,45 +161,3 @@ def test_what_the_page_itself_has_not_heard_is_no_alarm_of_a_process(page: Page,
     assert set(page.evaluate("alarmed")) == {"server_silent"}
     server.silent, server.heard_s = False, 0.03
     expect(page.locator("#alarms")).to_be_hidden(timeout=10_000)
-
-
-def test_the_report_tells_cuts_by_outcome_and_vine_and_what_was_refused(page: Page, server: PlayedServer) -> None:
-    open_screen(page, "report")
-    expect(page.locator("rp-report")).to_contain_text("Nothing has been cut yet.")
-    cuts = [CutReport(cut_id="c1", point_id="p1", vine=1, spur=1, outcome="DONE", ended_at=2e9, seconds=3.0)]
-    cuts.append(CutReport(cut_id="c2", point_id="p2", vine=1, spur=2, outcome="UNKNOWN", ended_at=2e9, seconds=5.0))
-    server.report = SessionReport(
-        began_at=1.9e9,
-        written_at=2e9,
-        cuts=tuple(cuts),
-        cut_count=2,
-        vines=(VineReport(vine=1, done=1, unknown=1, seconds=8.0),),
-        refusals=(RefusalReport(at=2e9, user="Bob", asked="Start", reason=reasons.control_held("Ada")),),
-        refusal_count=1,
-    )
-    open_screen(page, "engineer")
-    open_screen(page, "report")
-    expect(page.locator(".sums dd")).to_have_text(["1", "0", "1", "0", "4.0", "1", "1"])
-    expect(page.locator("rp-report tbody tr")).to_have_count(4)
-    expect(page.locator("rp-report")).to_contain_text("Ada holds control")
-    expect(page.locator('a[download="cuts.csv"]')).to_have_attribute("href", "api/report.csv")
-
-
-def test_a_cut_in_the_report_is_called_wrong_and_right_again(page: Page, server: PlayedServer) -> None:
-    cuts = [CutReport(cut_id="c1", point_id="p1", vine=1, spur=1, outcome="DONE", ended_at=2e9, seconds=3.0)]
-    cuts.append(CutReport(cut_id="c2", point_id="p2", vine=1, spur=2, outcome="UNKNOWN", ended_at=2e9, seconds=5.0))
-    server.report = SessionReport(began_at=1.9e9, written_at=2e9, cuts=tuple(cuts), cut_count=2)
-    server.answers["/api/points/p1/judge"] = (200, {"ok": True})
-    open_screen(page, "report")
-    wrong = page.get_by_role("button", name="The cut at p1 was wrong")
-    expect(page.locator(".judgement")).to_have_count(1)
-    expect(wrong).to_have_attribute("aria-pressed", "false")
-    server.report = msgspec.structs.replace(
-        server.report, cuts=(msgspec.structs.replace(cuts[0], wrong_by="Bob"), cuts[1])
-    )
-    wrong.click()
-    expect(wrong).to_have_attribute("aria-pressed", "true")
-    expect(wrong).to_have_attribute("title", "Bob called it wrong; press to call it right")
-    wrong.click()
-    until(page, lambda: len(server.posted) == 2)
-    assert server.posted == [("/api/points/p1/judge", {"wrong": True}), ("/api/points/p1/judge", {"wrong": False})]

@@ -227,7 +227,15 @@ def test_the_page_is_small_and_keeps_to_its_own_files() -> None:
             waiting += [(script.parent / name).resolve() for name in imported]
     assert sum(len(sent[script].encode()) for script in first) < 150_000, "what the page fetches before it is used"
     assert sum(text.stat().st_size for text in (folder / "text").glob("*.en.json")) < 90_000, "and the texts"
-    opened = ["rp-review.js", "rp-drive.js", "rp-report.js", "rp-engineer.js", "rp-preview.js", "rp-robots.js"]
+    opened = [
+        "rp-review.js",
+        "rp-drive.js",
+        "rp-report.js",
+        "rp-engineer.js",
+        "rp-preview.js",
+        "rp-replay.js",
+        "rp-robots.js",
+    ]
     later = set[Path](folder / "components" / name for name in opened) | {folder / "js/control/lease-worker.js"}
     waiting = list(later)
     while waiting:

@@ -38,9 +38,11 @@ BUTTONS = ("Arm", "Survey", "Start", "Pause", "Resume", "Home", "Acknowledge")
 FACTS = ("cut", "keeps", "cane", "place", "clear", "content")
 READINGS = re.findall(r'\bid: "([\w-]+)"', (WEB / "js" / "views" / "readings.js").read_text(encoding="utf-8"))
 COLUMNS = (
-    *("vine", "done", "not_cut", "unknown", "unreachable", "minutes", "ended", "point", "outcome", "seconds", "user"),
-    *("when", "who", "asked", "why", "what", "mean", "vine_count", "refused", "judgement"),
+    *("vine", "done", "not_cut", "unknown", "unreachable", "minutes", "when", "who", "asked", "why", "what", "mean"),
+    *("date", "duration", "at_work", "user", "called_wrong", "vines_an_hour", "refused"),
 )
+PANELS = ("alarms", "processes", "telemetry", "charts", "log", "topics", "models")
+TOPIC_COLUMNS = ("topic", "sender", "rate", "nominal", "age", "count", "rejected")
 CHOICES = ("part.tool", "part.base", "part.joints", "axes.tool", "axes.base", "axes.world")
 PARTS = {GROUND, *(part_of(shape.name) for shape in robot_geometry(RobotModel()).geometryObjects)}
 CONSTRAINTS = (
@@ -71,9 +73,17 @@ FAMILIES: dict[str, Sequence[str]] = {
     "label.${}": ("train", "held-out"),
     "label.${}.hint": ("train", "held-out"),
     "label.class.${}": tuple(name for name in VALUES if name != "unlabelled"),
-    "report.${}": ("TakeControl", "GrantControl", "ReturnControl"),
-    "report.table.${}": ("vines", "cuts", "refusals", "control"),
-    "report.none.${}": ("vines", "cuts", "refusals", "control"),
+    "report.${}": ("TakeControl", "GrantControl", "ReturnControl", "before", "after"),
+    "report.table.${}": ("timeline", "cuts", "left", "vines", "refusals", "control"),
+    "report.none.${}": ("vines", "refusals", "control"),
+    "report.left.${}": ("UNKNOWN", "UNREACHABLE", "PROPOSED", "undecided"),
+    "panel.${}": PANELS,
+    "panels.${}": ("earlier", "later", "hide"),
+    "processes.${}": ("process", "version", "runs", "age"),
+    "topics.${}": TOPIC_COLUMNS,
+    "topics.${}.hint": TOPIC_COLUMNS,
+    "models.${}": ("network", "method", "robot", "plan", "preview", "point", "revision", "state", "digest"),
+    "models.robot.${}": get_args(types.BridgeKind),
     "report.column.${}": COLUMNS,
     "severity.${}": get_args(types.Severity),
     "log.least.${}": get_args(types.Severity),

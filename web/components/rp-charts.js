@@ -1,4 +1,4 @@
-// Charts of all readings and processes over the last five minutes. Pointing at a moment shows the values then.
+// Charts of all readings and processes over the last five minutes, with axes of values and times. Pointing at a moment shows the values then.
 
 import { PROCESSES } from "../js/link/messages.js";
 import { ageWords } from "../js/state/format.js";
@@ -13,7 +13,8 @@ import { READINGS, beyondLimit } from "../js/views/readings.js";
  * @typedef {object} Plot
  * @property {readonly Sample[]} samples Oldest first; NaN where unknown.
  * @property {number} newest Time at the right edge (ms).
- * @property {number} fullScale Minimum of the upper edge.
+ * @property {number} fullScale Least upper end of the value axis.
+ * @property {string} unit
  * @property {readonly number[]} limits Drawn as dashed lines.
  * @property {number|null} pointed Time under the cursor (ms).
  */
@@ -37,6 +38,7 @@ function prepareCanvas(canvas) {
   pen.setTransform(scale, 0, 0, scale, 0, 0);
   pen.clearRect(0, 0, width, height);
   const style = getComputedStyle(canvas);
+  pen.font = `13px ${style.fontFamily}`;
   /** @param {string} name */
   const colour = (name) => style.getPropertyValue(`--${name}`).trim();
   return { pen, width, height, colour };
@@ -44,31 +46,45 @@ function prepareCanvas(canvas) {
 
 /** @typedef {NonNullable<ReturnType<typeof prepareCanvas>>} Sheet */
 
-/**
- * @param {Sheet} sheet
- * @param {number} newest
- */
-function drawMinutes({ pen, width, height, colour }, newest) {
-  pen.strokeStyle = colour("line");
-  pen.lineWidth = 1;
-  pen.beginPath();
-  for (let back = MINUTE_MS; back < SPAN_MS; back += MINUTE_MS) {
-    const x = Math.round(xAt(newest - back, newest, width)) + 0.5;
-    pen.moveTo(x, 0);
-    pen.lineTo(x, height);
-  }
-  pen.moveTo(0, height - 0.5);
-  pen.lineTo(width, height - 0.5);
-  pen.stroke();
-}
+/** Room for the values, the times and half a label around the curves (px). */
+const LEFT = 64;
+const BOTTOM = 20;
+const TOP = 8;
+const RIGHT = 14;
+/** Least distance of two times on the axis (px). */
+const TIME_PX = 64;
 
 /**
  * @param {number} at
  * @param {number} newest
- * @param {number} width
+ * @param {number} width Of the canvas.
  */
 function xAt(at, newest, width) {
-  return width * (1 - (newest - at) / SPAN_MS);
+  return LEFT + (width - LEFT - RIGHT) * (1 - (newest - at) / SPAN_MS);
+}
+
+/**
+ * The time axis: a line every minute, and as many labels as there is room for.
+ *
+ * @param {Sheet} sheet
+ * @param {number} newest
+ */
+function drawTimes({ pen, width, height, colour }, newest) {
+  const room = (width - LEFT - RIGHT) / (SPAN_MS / MINUTE_MS);
+  const every = Math.ceil(TIME_PX / Math.max(room, 1));
+  pen.strokeStyle = colour("line");
+  pen.fillStyle = colour("muted");
+  pen.lineWidth = 1;
+  pen.textAlign = "center";
+  pen.textBaseline = "bottom";
+  for (let back = 0; back <= SPAN_MS / MINUTE_MS; back++) {
+    const x = Math.round(xAt(newest - back * MINUTE_MS, newest, width)) + 0.5;
+    pen.beginPath();
+    pen.moveTo(x, TOP);
+    pen.lineTo(x, height - BOTTOM + 3);
+    pen.stroke();
+    if (back % every === 0) pen.fillText(back === 0 ? text("charts.now") : text("charts.minutes", { minutes: back }), x, height);
+  }
 }
 
 /**
@@ -82,20 +98,47 @@ function drawCursor({ pen, width, height, colour }, pointed, newest) {
   pen.strokeStyle = colour("ink");
   pen.setLineDash([]);
   pen.beginPath();
-  pen.moveTo(x, 0);
-  pen.lineTo(x, height);
+  pen.moveTo(x, TOP);
+  pen.lineTo(x, height - BOTTOM);
   pen.stroke();
 }
 
+/** Ends of a value axis, in parts of a power of ten. */
+const ROUND = Object.freeze([1, 1.5, 2, 3, 4, 5, 6, 8, 10]);
+
 /**
- * Upper edge of a chart.
+ * Upper end of a chart's value axis: a round number above all values and limits.
  *
  * @param {Plot} plot
  */
 function upperBound({ samples, fullScale, limits }) {
   let most = Math.max(fullScale, ...limits.map((limit) => 1.1 * limit));
-  for (const { value } of samples) if (value > most) most = 1.05 * value;
-  return most;
+  for (const { value } of samples) if (value > most) most = value;
+  const power = 10 ** Math.floor(Math.log10(most));
+  return power * (ROUND.find((each) => each * power >= most * (1 - 1e-9)) ?? 10);
+}
+
+/**
+ * The value axis: the ends and the middle.
+ *
+ * @param {Sheet} sheet
+ * @param {number} top
+ * @param {string} unit
+ * @param {(value: number) => number} up Height of a value (px).
+ */
+function drawValues({ pen, width, colour }, top, unit, up) {
+  pen.strokeStyle = colour("line");
+  pen.fillStyle = colour("muted");
+  pen.textAlign = "right";
+  pen.textBaseline = "middle";
+  for (const value of [0, top / 2, top]) {
+    const y = Math.round(up(value)) + 0.5;
+    pen.beginPath();
+    pen.moveTo(LEFT, y);
+    pen.lineTo(width - RIGHT, y);
+    pen.stroke();
+    pen.fillText(`${Number(value.toPrecision(3))} ${value === 0 ? "" : unit}`.trim(), LEFT - 6, y);
+  }
 }
 
 /**
@@ -108,14 +151,15 @@ function drawLine(canvas, plot) {
   const { pen, width, height, colour } = sheet;
   const top = upperBound(plot);
   /** @param {number} value */
-  const up = (value) => height - 2 - (height - 4) * Math.max(0, value / top);
-  drawMinutes(sheet, plot.newest);
+  const up = (value) => height - BOTTOM - (height - BOTTOM - TOP) * Math.max(0, value / top);
+  drawTimes(sheet, plot.newest);
+  drawValues(sheet, top, plot.unit, up);
   pen.strokeStyle = colour("warn");
   pen.setLineDash([4, 3]);
   for (const limit of plot.limits) {
     pen.beginPath();
-    pen.moveTo(0, up(limit));
-    pen.lineTo(width, up(limit));
+    pen.moveTo(LEFT, up(limit));
+    pen.lineTo(width - RIGHT, up(limit));
     pen.stroke();
   }
   pen.setLineDash([]);
@@ -140,7 +184,7 @@ function drawLine(canvas, plot) {
  * One band for each row: filled while present, a thin line while gone, empty if unknown.
  *
  * @param {HTMLCanvasElement} canvas
- * @param {readonly (readonly Sample[])[]} rows
+ * @param {readonly (readonly [string, readonly Sample[]])[]} rows With their names.
  * @param {number} newest
  * @param {number|null} pointed
  */
@@ -148,9 +192,14 @@ function drawBands(canvas, rows, newest, pointed) {
   const sheet = prepareCanvas(canvas);
   if (!sheet) return;
   const { pen, width, height, colour } = sheet;
-  const step = height / rows.length;
-  rows.forEach((samples, row) => {
-    const y = row * step + 2;
+  const step = (height - BOTTOM - TOP) / rows.length;
+  drawTimes(sheet, newest);
+  rows.forEach(([name, samples], row) => {
+    const y = TOP + row * step + 2;
+    pen.fillStyle = colour("muted");
+    pen.textAlign = "right";
+    pen.textBaseline = "middle";
+    pen.fillText(name, LEFT - 6, y + step / 2 - 2, LEFT - 6);
     for (const [index, sample] of samples.entries()) {
       const next = samples[index + 1]?.at ?? newest;
       const x = xAt(sample.at, newest, width);
@@ -160,7 +209,6 @@ function drawBands(canvas, rows, newest, pointed) {
       else pen.fillRect(x, y + step / 2 - 3, wide, 2);
     }
   });
-  drawMinutes(sheet, newest);
   drawCursor(sheet, pointed, newest);
 }
 
@@ -200,9 +248,6 @@ export class RpCharts extends HTMLElement {
     this.tabIndex = 0;
     this.setAttribute("role", "group");
     this.setAttribute("aria-label", text("charts.label"));
-    const names = element("ol", { class: "bands" }, ...PROCESSES.map((name) => element("li", { text: labelOf(name) })));
-    this.presence.canvas.before(names);
-    this.presence.box.classList.add("presence-chart");
     this.append(...this.figures.map((each) => each.box), this.presence.box);
     this.pause.addEventListener("click", () => {
       this.shown.set(this.shown.get() === history ? history.copy() : history);
@@ -230,7 +275,8 @@ export class RpCharts extends HTMLElement {
     const canvas = /** @type {Element} */ (event.target).closest("canvas");
     if (!canvas) return;
     const box = canvas.getBoundingClientRect();
-    this.back.set(SPAN_MS * Math.min(1, Math.max(0, 1 - (event.clientX - box.left) / box.width)));
+    const part = (event.clientX - box.left - LEFT) / (box.width - LEFT - RIGHT);
+    this.back.set(SPAN_MS * Math.min(1, Math.max(0, 1 - part)));
   }
 
   draw() {
@@ -249,7 +295,7 @@ export class RpCharts extends HTMLElement {
       if (!each) return;
       const samples = shown.of(reading.id);
       const limits = [reading.warnAbove, reading.warnBelow].filter((limit) => limit !== undefined);
-      drawLine(each.canvas, { samples, newest, fullScale: reading.fullScale, limits, pointed });
+      drawLine(each.canvas, { samples, newest, fullScale: reading.fullScale, unit: reading.unit, limits, pointed });
       const found = sampleAt(samples, pointed ?? newest);
       const words = found ? `${reading.format(found.value)} ${reading.unit}`.trim() : "–";
       setText(each.value, words);
@@ -257,9 +303,9 @@ export class RpCharts extends HTMLElement {
       each.box.classList.toggle("warned", over);
       each.canvas.setAttribute("aria-label", text(over ? "charts.beyond" : "charts.within", { label: text(`reading.${reading.id}`), words }));
     });
-    const rows = PROCESSES.map((process) => shown.of(process));
+    const rows = PROCESSES.map((process) => /** @type {const} */ ([labelOf(process), shown.of(process)]));
     drawBands(this.presence.canvas, rows, newest, pointed);
-    const there = rows.filter((row) => (sampleAt(row, pointed ?? newest)?.value ?? 0) > 0).length;
+    const there = rows.filter(([, row]) => (sampleAt(row, pointed ?? newest)?.value ?? 0) > 0).length;
     setText(this.presence.value, text("charts.there", { there, all: PROCESSES.length }));
     this.presence.canvas.setAttribute("aria-label", text("charts.presence", { there, all: PROCESSES.length }));
   }

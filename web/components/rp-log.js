@@ -17,6 +17,8 @@ const FROM = Object.freeze(["all", ...PROCESSES, "page"]);
 
 class RpLog extends HTMLElement {
   connectedCallback() {
+    // Moved among the panels.
+    if (this.childElementCount > 0) return;
     const least = dropDown(
       { id: "log-filter", attributes: { "aria-label": text("log.least_label") } },
       LEAST.map((each) => [each, text(`log.least.${each}`)]),
@@ -31,7 +33,7 @@ class RpLog extends HTMLElement {
     const empty = element("p", { class: "empty" });
     this.id = "log";
     const tools = element("div", { class: "log-tools" }, words, from, least);
-    this.append(element("div", { class: "panel-head" }, element("h2", { text: text("log.title") }), tools), live, empty);
+    this.append(tools, live, empty);
 
     // Follow the newest line until the operator scrolls up; a resize does not count.
     let following = true;

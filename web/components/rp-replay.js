@@ -1,76 +1,98 @@
-// Playback of a recording: position, play and pause, and who accepted which point.
+// Playback of a recording: play and pause, speed, and its timeline as the scrubber.
 
-import { ask } from "../js/link/api.js";
+import { SPEEDS, jump, replay, seek, togglePlay } from "../js/control/replay.js";
 import { dateWords } from "../js/state/format.js";
-import { pageState, points } from "../js/state/page-state.js";
+import { pageState } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
-import { labelOf, text } from "../js/state/texts.js";
-import { element, setText } from "../js/views/dom.js";
+import { text } from "../js/state/texts.js";
+import { isMark, timeline } from "../js/state/timeline.js";
+import { dropDown, element, setAttribute, setText } from "../js/views/dom.js";
+import { icon, setIcon } from "../js/views/icons.js";
+import { RpTimeline } from "./rp-timeline.js";
+
+/** An event this long before the position (s) was jumped to just now. */
+const JUST_S = 1;
 
 class RpReplay extends HTMLElement {
-  toggle = element("button", { id: "replay-toggle" });
+  timeline = new RpTimeline();
+  shape = element("span", { class: "shape" });
+  label = element("span");
+  toggle = element("button", { id: "replay-toggle", onclick: togglePlay }, this.shape, this.label);
   slider = element("input", {
     id: "replay-position",
     attributes: { type: "range", min: "0", step: "0.1", value: "0", "aria-label": text("replay.position") },
   });
-  time = element("span", { class: "number", attributes: { role: "status" } });
+  speed = dropDown(
+    { id: "replay-speed", attributes: { "aria-label": text("replay.speed"), title: text("replay.speed_keys") } },
+    SPEEDS.map((each) => [String(each), text("replay.times", { speed: each })]),
+  );
+  time = element("span", { class: "number replay-time", attributes: { role: "timer" } });
   words = element("strong");
-  list = element("ul", { id: "replay-accepted" });
   /** While dragged the slider is not updated. */
   dragged = false;
 
   connectedCallback() {
     this.setAttribute("role", "group");
     this.setAttribute("aria-label", text("replay.label"));
-    const who = element("details", {}, element("summary", { text: text("replay.who") }), this.list);
-    this.append(this.words, this.toggle, this.slider, this.time, who);
-    this.toggle.addEventListener("click", () => {
-      const replay = pageState.get()?.replay;
-      if (!replay) return;
-      const over = replay.position_s >= replay.duration_s;
-      this.seek({ playing: !replay.playing, ...(over ? { position_s: 0 } : {}) });
-    });
+    this.append(
+      element("div", { class: "replay-name" }, element("span", { class: "chip", text: text("replay.label") }), this.words),
+      element("div", { class: "replay-tools" }, step(-1), this.toggle, step(1), this.speed, this.time),
+      element("div", { class: "replay-scrubber" }, this.timeline, this.slider),
+    );
     this.slider.addEventListener("input", () => {
       this.dragged = true;
     });
     this.slider.addEventListener("change", () => {
       this.dragged = false;
-      this.seek({ position_s: Number(this.slider.value), playing: pageState.get()?.replay?.playing ?? false });
+      jump(Number(this.slider.value));
     });
+    this.speed.addEventListener("change", () => seek({ speed: Number(this.speed.value) }));
+    this.hidden = false;
+    this.timeline.open(true);
     drawOn([pageState], () => this.draw());
-    drawOn([pageState, points], () => this.drawList());
-  }
-
-  /** @param {{ playing: boolean, position_s?: number }} request */
-  seek(request) {
-    void ask(text("replay.seek"), "api/replay", request);
   }
 
   draw() {
-    const replay = pageState.get()?.replay ?? null;
-    this.hidden = replay === null;
-    if (replay === null) return;
-    setText(this.words, text("replay.name", { name: replay.name }));
-    setText(this.toggle, text(replay.playing ? "replay.pause" : "replay.play"));
-    this.slider.max = String(replay.duration_s);
-    if (!this.dragged) this.slider.value = String(replay.position_s);
-    setText(
-      this.time,
-      text("replay.time", {
-        at: replay.position_s.toFixed(1),
-        end: replay.duration_s.toFixed(1),
-        date: dateWords(replay.begins_at + replay.position_s),
-      }),
-    );
+    const now = replay();
+    if (now === null) return;
+    setText(this.words, text(now.complete ? "replay.name" : "replay.cut_short", { name: now.name }));
+    setIcon(this.shape, now.playing ? "PAUSED" : "AUTO");
+    setText(this.label, text(now.playing ? "replay.pause" : "replay.play"));
+    setAttribute(this.slider, "max", String(now.duration_s));
+    if (!this.dragged) this.slider.value = String(now.position_s);
+    if (document.activeElement !== this.speed) this.speed.value = String(now.speed);
+    const [at, end] = [lapse(now.position_s), lapse(now.duration_s)];
+    const date = dateWords(now.begins_at + now.position_s);
+    setText(this.time, text("replay.time", { at, end, date }));
+    setAttribute(this.slider, "aria-valuetext", text("replay.time", { at, end, date }));
   }
+}
 
-  drawList() {
-    if (this.hidden) return;
-    const rows = (points.get()?.points ?? []).filter((row) => row.entry.user !== "");
-    const lines = rows.map((row) => `${row.entry.point_id}: ${row.entry.user} · ${labelOf(row.entry.state)}`);
-    const words = lines.length > 0 ? lines : [text("replay.nobody")];
-    if (words.join("\n") === [...this.list.children].map((item) => item.textContent).join("\n")) return;
-    this.list.replaceChildren(...words.map((text) => element("li", { text })));
-  }
+/**
+ * Button to the next or the previous event.
+ *
+ * @param {1|-1} way
+ */
+function step(way) {
+  const name = text(way > 0 ? "replay.next" : "replay.previous");
+  const attributes = { "aria-label": name, title: name };
+  return element("button", { class: "quiet", data: { step: String(way) }, attributes, onclick: () => toEvent(way) }, icon(way > 0 ? "next" : "previous"));
+}
+
+/** @param {1|-1} way */
+function toEvent(way) {
+  const now = replay();
+  if (!now) return;
+  const times = (timeline.get()?.events ?? []).filter(isMark).map((event) => event.at - now.begins_at);
+  const found =
+    way > 0
+      ? times.find((at) => at > now.position_s + 1e-3)
+      : times.reverse().find((at) => at < now.position_s - (now.playing ? JUST_S : 1e-3));
+  if (found !== undefined) jump(found);
+}
+
+/** Minutes and seconds. @param {number} seconds */
+function lapse(seconds) {
+  return `${Math.floor(seconds / 60)}:${String(Math.floor(seconds % 60)).padStart(2, "0")}`;
 }
 customElements.define("rp-replay", RpReplay);

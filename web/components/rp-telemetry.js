@@ -2,8 +2,8 @@
 
 import { isLive, link, now, pageState, staleWords } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
-import { counted, text } from "../js/state/texts.js";
-import { element, panelHead, setText, svg } from "../js/views/dom.js";
+import { text } from "../js/state/texts.js";
+import { element, setText, svg } from "../js/views/dom.js";
 import { READINGS, beyondLimit } from "../js/views/readings.js";
 
 /** @typedef {import("../js/views/readings.js").Reading} Reading */
@@ -81,17 +81,16 @@ const SHOWN = READINGS.filter((reading) => reading.place !== "chart");
 
 class RpTelemetry extends HTMLElement {
   connectedCallback() {
-    const { head, note } = panelHead(text("telemetry.title"));
-    const title = element("summary");
-    const engineers = element("details", { class: "engineers" }, title);
-    this.append(head);
+    // Moved among the panels.
+    if (this.childElementCount > 0) return;
+    const note = element("span", { class: "stale-note", attributes: { role: "status" } });
+    this.append(note);
     const gauges = SHOWN.map((reading) => {
       const gauge = new RpGauge();
       gauge.init(reading);
-      (reading.place === "engineer" ? engineers : this).append(gauge);
+      this.append(gauge);
       return gauge;
     });
-    this.append(engineers);
     /** @type {(number|null)[]} */
     let values = SHOWN.map(() => null);
     drawOn([pageState], () => {
@@ -102,8 +101,6 @@ class RpTelemetry extends HTMLElement {
       // A simulated base has no battery.
       const battery = gauges[SHOWN.findIndex((reading) => reading.id === "battery")];
       if (battery) battery.hidden = state.bridge?.kind === "sim";
-      const warnings = gauges.filter((gauge) => gauge.parentElement === engineers && gauge.dataset.warning).length;
-      setText(title, warnings > 0 ? counted("telemetry.warnings", warnings) : text("telemetry.engineers"));
     });
     drawOn([now, link], () => {
       const words = staleWords("bridge", "controller");
@@ -113,7 +110,6 @@ class RpTelemetry extends HTMLElement {
       gauges.forEach((gauge, index) => gauge.addSample(live ? (values[index] ?? null) : null));
     });
     gauges.forEach((gauge) => gauge.show(null));
-    setText(title, text("telemetry.engineers"));
   }
 }
 

@@ -20,6 +20,7 @@ export function whyNothing() {
   if (status !== "open") return reason("no_link");
   const state = pageState.get();
   if (state === null) return reason("no_state_yet");
+  if (state.replay) return reason("recording_only");
   return state.role === "viewer" ? reason("viewer_only") : null;
 }
 

@@ -2,7 +2,7 @@
 
 import { post } from "../link/api.js";
 import { clockWords } from "../state/format.js";
-import { say } from "../state/page-state.js";
+import { pageState, say } from "../state/page-state.js";
 import { reasonText } from "../state/reasons.js";
 import { signal } from "../state/signals.js";
 import { labelOf, text } from "../state/texts.js";
@@ -47,7 +47,8 @@ export async function stopRobot(reason) {
  */
 export function listenForSpace(target) {
   const swallow = (/** @type {KeyboardEvent} */ event) => {
-    if (event.code !== "Space" || isTyping(event.target)) return false;
+    // A recording has nothing to stop.
+    if (event.code !== "Space" || isTyping(event.target) || pageState.get()?.replay) return false;
     event.preventDefault();
     event.stopImmediatePropagation();
     return true;

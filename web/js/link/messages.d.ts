@@ -845,6 +845,75 @@ export interface SpurDrawing {
   cuts: DrawnCut[];
 }
 
+/** Something that has happened in a session. */
+export interface TimelineEvent {
+  /** Time (s since 1970). */
+  at: number;
+  /** Change of mode, cut, cut that did not end as wanted, or refused command. */
+  kind: "mode"|"cut"|"failed_cut"|"refusal";
+  /** What has happened, as in the log. */
+  reason: Reason;
+  /** Mode before a change of mode; empty otherwise. */
+  before: Mode|"";
+  /** Mode after a change of mode; empty otherwise. */
+  mode: Mode|"";
+}
+
+/** Controller or replay → server: what has happened in a session; a replay tells the whole recording. */
+export interface Timeline {
+  type: "Timeline";
+  /** Begin of the session (s since 1970); 0 before its first record. */
+  began_at: number;
+  /** Its newest record, or the end of the recording (s since 1970). */
+  ended_at: number;
+  /** The newest events, oldest first. */
+  events: TimelineEvent[];
+  /** Number of older events. */
+  left_out: number;
+}
+
+/** The program that a process runs. */
+export interface Program {
+  type: "Program";
+  /** The sender. */
+  process: Process;
+  /** Version of Rolling Panda. */
+  version: string;
+  /** Start of the process (s since 1970). */
+  began_at: number;
+}
+
+/** A topic of the wire, and its messages as the server receives them. */
+export interface TopicTraffic {
+  /** Name of the topic. */
+  name: string;
+  /** Publishing processes, separated by commas, or "any". */
+  sender: string;
+  /** Rate by the topic table; 0 on event. */
+  nominal_hz: number;
+  /** Whether the server subscribes to it; the figures below are of what it receives. */
+  received: boolean;
+  /** Number of messages. */
+  count: number;
+  /** Mean rate of the newest messages; None before the second. */
+  rate_hz: number|null;
+  /** Age of the newest message (s); None before the first. */
+  age_s: number|null;
+  /** Number of messages that could not be read. */
+  rejected: number;
+}
+
+/** Answer of `/api/diagnostics`. */
+export interface Diagnostics {
+  type: "Diagnostics";
+  /** Time of the answer by the server's clock (s since 1970). */
+  wall_time: number;
+  /** Program of each process that has told it. */
+  programs: Program[];
+  /** Every topic of the wire. */
+  topics: TopicTraffic[];
+}
+
 export type FromServer = PageState|PagePoints|PagePreview|PageEvents|Selected|PickRay|Measured|HoldEnded|Pong;
 
 export type FromPage = Ping|Hold|ShowGizmo|PlaceByHand|PlaceCamera|ShowLayers|Measure|ShowPreview|Select;

@@ -59,6 +59,18 @@ export function durationWords(seconds) {
   return `${Math.floor(seconds / 60)} min ${Math.round(seconds % 60)} s`;
 }
 
+/**
+ * A time that may last for hours.
+ *
+ * @param {number} seconds
+ */
+export function spanWords(seconds) {
+  const whole = Math.max(0, Math.round(seconds));
+  const [hours, minutes] = [Math.floor(whole / 3600), Math.floor((whole % 3600) / 60)];
+  if (hours > 0) return text("span.hours", { hours, minutes });
+  return minutes > 0 ? text("span.minutes", { minutes, seconds: whole % 60 }) : text("span.seconds", { seconds: whole });
+}
+
 /** @param {number} metres */
 export function millimetres(metres) {
   const value = metres * 1000;

@@ -1,0 +1,145 @@
+"""The screen for engineers: panels that are arranged, versions, the wire, charts."""
+
+import msgspec
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.support.page_parts import open_screen
+from tests.support.played_server import PlayedServer, diagnostics
+
+pytestmark = pytest.mark.browser
+USUAL = ["alarms", "processes", "telemetry", "charts", "log", "topics", "models"]
+
+
+def order(page: Page) -> list[str]:
+    return page.locator("rp-engineer > section:visible").evaluate_all("all => all.map(each => each.dataset.panel)")
+
+
+def tool(page: Page, panel: str, what: str):
+    return page.locator(f'[data-panel="{panel}"] [data-arrange="{what}"]')
+
+
+def test_panels_are_moved_hidden_shown_and_remembered_by_keys_alone(page: Page, server: PlayedServer) -> None:
+    open_screen(page, "engineer")
+    assert order(page) == USUAL
+    expect(tool(page, "alarms", "earlier")).to_be_hidden()
+    tool(page, "processes", "earlier").press("Enter")
+    assert order(page)[:2] == ["processes", "alarms"]
+    # It is the first now: the other way is where the focus goes on.
+    expect(tool(page, "processes", "later")).to_be_focused()
+    tool(page, "log", "hide").press("Enter")
+    assert "log" not in order(page)
+    show = page.get_by_role("button", name="Show Log")
+    expect(show).to_be_focused()
+    # What is hidden is passed over.
+    tool(page, "topics", "earlier").click()
+    assert order(page) == ["processes", "alarms", "telemetry", "topics", "charts", "models"]
+    page.reload()
+    expect(page.locator("rp-engineer > section").first).to_be_visible()
+    assert order(page) == ["processes", "alarms", "telemetry", "topics", "charts", "models"]
+    page.get_by_role("button", name="Show Log").press("Enter")
+    assert "log" in order(page)
+    expect(tool(page, "log", "hide")).to_be_focused()
+    page.locator("#reset-panels").click()
+    assert order(page) == USUAL
+    page.reload()
+    expect(page.locator("rp-engineer > section").first).to_be_visible()
+    assert order(page) == USUAL
+
+
+@pytest.mark.parametrize(
+    "kept", ["no JSON", "null", "[]", '{"order": "log"}', '{"order": ["gone", "log", "log"], "hidden": 3}']
+)
+def test_a_memory_that_is_damaged_or_of_another_version_hides_nothing(
+    page: Page, server: PlayedServer, kept: str
+) -> None:
+    page.evaluate("kept => localStorage.setItem('rp-panels', kept)", kept)
+    page.goto(page.url.split("#")[0] + "?again#engineer")
+    expect(page.locator("rp-engineer > section").first).to_be_visible()
+    assert sorted(order(page)) == sorted(USUAL)
+
+
+def test_a_panel_that_was_moved_goes_on(page: Page, server: PlayedServer) -> None:
+    open_screen(page, "engineer")
+    page.locator("#log-words").fill("signed")
+    tool(page, "log", "earlier").click()
+    tool(page, "telemetry", "later").click()
+    expect(page.locator("#log li:visible .text")).to_have_text(["signed in"])
+    expect(page.locator("#log-words")).to_have_value("signed")
+    expect(page.locator("#log li")).to_have_count(1)
+    expect(page.locator("rp-gauge [class*=value]").first).to_have_text("2.1")
+
+
+def test_processes_have_versions_and_a_different_one_is_told(page: Page, server: PlayedServer) -> None:
+    open_screen(page, "engineer")
+    row = page.locator('[data-panel="processes"] [data-process="bridge"]')
+    expect(row).to_contain_text("0.1.0")
+    expect(row).to_contain_text("1 h 23 min")
+    expect(page.locator('[data-panel="processes"] .warned')).to_be_empty()
+    told = diagnostics()
+    programs = (msgspec.structs.replace(told.programs[0], version="0.2.0"), *told.programs[2:])
+    server.diagnostics = msgspec.structs.replace(told, programs=programs)
+    expect(page.locator('[data-panel="processes"] .warned')).to_contain_text("different versions", timeout=6000)
+    expect(page.locator('[data-panel="processes"] [data-process="controller"]')).to_contain_text("not told")
+    server.gone = {"bridge": 5.0}
+    expect(row).to_have_attribute("data-present", "false")
+
+
+def test_every_topic_has_its_rate_and_age_and_a_late_one_stands_out(page: Page, server: PlayedServer) -> None:
+    open_screen(page, "engineer")
+    rows = page.locator('[data-panel="topics"] tbody tr')
+    expect(rows).to_have_count(len(server.diagnostics.topics))
+    expect(page.locator('[data-topic="state/joints"]')).to_contain_text("100 Hz")
+    expect(page.locator('[data-topic="command/motion"]')).to_contain_text("not for the server")
+    expect(page.locator('[data-late="true"]')).to_have_count(0)
+    topics = [
+        msgspec.structs.replace(each, age_s=9.0, rejected=3) if each.name in ("state/joints", "event") else each
+        for each in diagnostics().topics
+    ]
+    server.diagnostics = msgspec.structs.replace(server.diagnostics, topics=tuple(topics))
+    # A log line comes on event, and is never late.
+    expect(page.locator('[data-late="true"]')).to_have_attribute("data-topic", "state/joints", timeout=6000)
+    expect(page.locator('[data-topic="event"] td').last).to_have_text("3")
+
+
+def test_the_hashes_of_plan_and_points_are_there(page: Page, server: PlayedServer) -> None:
+    open_screen(page, "engineer")
+    panel = page.locator('[data-panel="models"]')
+    expect(panel.locator('[data-model="network"] dd')).to_have_text("simulator labels")
+    expect(panel.locator('[data-model="method"] dd')).to_have_text("nullspace")
+    expect(panel.locator('[data-model="plan"] dd')).to_have_text("–")
+    panel.locator("summary").click()
+    expect(panel.locator("tbody tr").first).to_contain_text(server.points[0].point.digest)
+
+
+def test_charts_have_axes_and_show_the_values_of_a_moment(page: Page, server: PlayedServer) -> None:
+    open_screen(page, "engineer")
+    chart = page.locator('[data-chart="position-error"] canvas')
+    expect(chart).to_be_visible()
+    page.wait_for_timeout(700)
+    # Words of the axes are drawn at the left and below, where no curve is.
+    ink = chart.evaluate("""canvas => {
+      const scale = canvas.width / canvas.clientWidth, pen = canvas.getContext("2d");
+      const drawn = (x, y, w, h) => {
+        const pixels = pen.getImageData(x * scale, y * scale, w * scale, h * scale).data;
+        return pixels.some((value, index) => index % 4 === 3 && value > 90);
+      };
+      return {
+        values: drawn(0, 0, 56, 16), zero: drawn(40, canvas.clientHeight - 30, 20, 20),
+        times: drawn(66, canvas.clientHeight - 14, canvas.clientWidth - 80, 14),
+      };
+    }""")
+    assert ink == {"values": True, "zero": True, "times": True}
+    page.locator("rp-charts").focus()
+    page.keyboard.press("ArrowLeft")
+    expect(page.locator('[data-panel="charts"] .panel-head')).to_contain_text("ago")
+
+
+def test_alarms_are_listed_with_what_to_do(page: Page, server: PlayedServer) -> None:
+    open_screen(page, "engineer")
+    panel = page.locator('[data-panel="alarms"]')
+    expect(panel).to_contain_text("No alarms.")
+    server.plain_wire = True
+    expect(panel.locator('[data-code="wire_plain"]')).to_be_visible()
+    server.plain_wire = False
+    expect(panel.locator("li")).to_have_count(0)
