@@ -1,9 +1,11 @@
 """The page's static files: minified scripts, one bundled stylesheet, and preloads, cached in memory at the start.
 
 Scripts are sent without comments, types and indentation, which are a third of them. The stylesheets block the first
-paint and are bundled. The page preloads all its scripts, so that the browser requests them at once.
+paint and are bundled. The page preloads all its scripts, so that the browser requests them at once. Scripts, stylesheet
+and texts are compressed for browsers that take it, which is all of them: a vineyard's link is slow.
 """
 
+import gzip
 import hashlib
 import re
 from pathlib import Path, PurePosixPath
@@ -19,11 +21,11 @@ _SCRIPT = re.compile(r'^( *)<script type="module" src="([\w./-]+\.js)"></script>
 #: A static import; dynamic ones, `import(…)`, are not preloaded.
 _IMPORT = re.compile(r'^(?:import|export) (?:[^"(]* from )?"(\.[\w./-]+\.js)";', re.MULTILINE)
 _STYLES = "page.css"
-_MEDIA_TYPES = {".js": "text/javascript", ".css": "text/css", ".html": "text/html"}
+_MEDIA_TYPES = {".js": "text/javascript", ".css": "text/css", ".html": "text/html", ".json": "application/json"}
 
 
 class PageFiles(StaticFiles):
-    """A folder of files, of which scripts, the bundled stylesheet and the page are cached. Scripts keep their lines."""
+    """A folder of files: scripts, texts, the bundled stylesheet and the page are cached. Scripts keep their lines."""
 
     def __init__(self, folder: Path) -> None:
         """Read `folder`, which has the page's `index.html`."""
@@ -34,14 +36,16 @@ class PageFiles(StaticFiles):
         }
         page = (folder / "index.html").read_text(encoding="utf-8")
         styles = (folder / name for name in _STYLESHEET.findall(page))
-        self._cache = {
+        cached = {
             **scripts,
+            **{f"text/{file.name}": file.read_text(encoding="utf-8") for file in (folder / "text").glob("*.json")},
             _STYLES: "\n".join(style.read_text(encoding="utf-8") for style in styles),
             "index.html": with_preloads(page, scripts),
         }
-        self._etags = {
-            name: f'"{hashlib.sha256(text.encode()).hexdigest()[:32]}"' for name, text in self._cache.items()
-        }
+        self._cache = {name: text.encode() for name, text in cached.items()}
+        self._compressed = {name: gzip.compress(content, mtime=0) for name, content in self._cache.items()}
+        # Weak: the same for both forms.
+        self._etags = {name: f'W/"{hashlib.sha256(content).hexdigest()[:32]}"' for name, content in self._cache.items()}
 
     async def get_response(self, path: str, scope: Scope) -> Response:
         """The file, or 304 where it has not changed."""
@@ -55,14 +59,17 @@ class PageFiles(StaticFiles):
         Raises:
             KeyError: It is not cached.
         """
-        headers = {"ETag": self._etags[name], "Cache-Control": "no-cache"}
-        requested = dict(scope["headers"]).get(b"if-none-match", b"").decode("latin-1")
-        if requested == headers["ETag"]:
+        asked = dict(scope["headers"])
+        headers = {"ETag": self._etags[name], "Cache-Control": "no-cache", "Vary": "Accept-Encoding"}
+        if asked.get(b"if-none-match", b"").decode("latin-1") == headers["ETag"]:
             return Response(status_code=304, headers=headers)
-        return Response(self._cache[name], media_type=_MEDIA_TYPES[PurePosixPath(name).suffix], headers=headers)
+        content = self._cache[name]
+        if b"gzip" in asked.get(b"accept-encoding", b""):
+            headers["Content-Encoding"], content = "gzip", self._compressed[name]
+        return Response(content, media_type=_MEDIA_TYPES[PurePosixPath(name).suffix], headers=headers)
 
     def holds(self, path: str) -> bool:
-        """Whether a path of the page is that of a cached script or stylesheet."""
+        """Whether a path of the page is that of a cached script, text or stylesheet."""
         return not path.endswith(".html") and path[1:] in self._cache
 
 

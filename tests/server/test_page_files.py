@@ -1,4 +1,5 @@
 import asyncio
+import gzip
 import re
 
 import pytest
@@ -65,6 +66,17 @@ def test_every_script_of_the_page_is_sent_and_nothing_outside_the_folder():
     for path in ("nothing.js", "../server/app.js", "js/../../server/app.js"):
         with pytest.raises(HTTPException):
             ask(files, path)
+
+
+@pytest.mark.parametrize("name", ["js/app.js", "page.css", "index.html", "text/page.en.json", "text/reasons.en.json"])
+def test_a_browser_that_takes_it_gets_a_file_compressed(name):
+    files = PageFiles(resource("web/index.html").parent)
+    plain, sent = ask(files, name), ask(files, name, accept_encoding="gzip, deflate, br")
+    assert "content-encoding" not in plain.headers and sent.headers["content-encoding"] == "gzip"
+    assert gzip.decompress(sent.body) == plain.body and len(sent.body) < 0.5 * len(plain.body)
+    assert sent.headers["content-length"] == str(len(sent.body)) and sent.headers["content-type"]
+    assert {plain.headers["vary"], sent.headers["vary"]} == {"Accept-Encoding"}
+    assert ask(files, name, if_none_match=sent.headers["etag"], accept_encoding="gzip").status_code == 304
 
 
 def test_the_page_asks_for_one_stylesheet_in_the_order_of_its_several_and_for_every_script_at_once():
