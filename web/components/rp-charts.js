@@ -1,7 +1,7 @@
 // Charts of all readings and processes over the last five minutes, with axes of values and times. Pointing at a moment shows the values then.
 
 import { PROCESSES } from "../js/link/messages.js";
-import { ageWords } from "../js/state/format.js";
+import { ageWords, significant } from "../js/state/format.js";
 import { drawOn, signal } from "../js/state/signals.js";
 import { labelOf, text } from "../js/state/texts.js";
 import { element, setText } from "../js/views/dom.js";
@@ -137,7 +137,7 @@ function drawValues({ pen, width, colour }, top, unit, up) {
     pen.moveTo(LEFT, y);
     pen.lineTo(width - RIGHT, y);
     pen.stroke();
-    pen.fillText(`${Number(value.toPrecision(3))} ${value === 0 ? "" : unit}`.trim(), LEFT - 6, y);
+    pen.fillText(`${significant(value, 3)} ${value === 0 ? "" : unit}`.trim(), LEFT - 6, y);
   }
 }
 

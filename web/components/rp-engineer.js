@@ -2,7 +2,7 @@
 
 import { fetchJson } from "../js/link/api.js";
 import { PROCESSES } from "../js/link/messages.js";
-import { ageWords, dateWords, spanWords } from "../js/state/format.js";
+import { ageWords, dateWords, significant, spanWords } from "../js/state/format.js";
 import { isLive, isOpening, link, now, pageState, points, preview, processAge } from "../js/state/page-state.js";
 import { PANELS, arrangement, movePanel, resetPanels, showPanel } from "../js/state/panels.js";
 import { partsOf, reasonText, severityOf } from "../js/state/reasons.js";
@@ -253,7 +253,7 @@ function newRow({ name, sender }) {
 
 /** @param {number|null} rate */
 function hertz(rate) {
-  return rate === null ? "–" : text("topics.hertz", { rate: rate.toPrecision(rate >= 100 ? 3 : 2) });
+  return rate === null ? "–" : text("topics.hertz", { rate: significant(rate, rate >= 100 ? 3 : 2) });
 }
 
 /** @param {TopicTraffic} topic */

@@ -18,6 +18,7 @@ import {
   whyNoApproval,
   whyNoPreview,
 } from "../js/control/preview.js";
+import { decimal } from "../js/state/format.js";
 import { link, now, pageState, points, preview, selected } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
 import { counted, labelOf, text } from "../js/state/texts.js";
@@ -97,8 +98,8 @@ class RpPreview extends HTMLElement {
       const at = moment.get() ?? 0;
       slider.max = String(state?.duration_s ?? 0);
       slider.value = String(at);
-      slider.setAttribute("aria-valuetext", `${at.toFixed(1)} s`);
-      setText(time, `${at.toFixed(1)} / ${(state?.duration_s ?? 0).toFixed(1)} s`);
+      slider.setAttribute("aria-valuetext", `${decimal(at, 1)} s`);
+      setText(time, `${decimal(at, 1)} / ${decimal(state?.duration_s ?? 0, 1)} s`);
       setText(words, wordsOf(state, moment.get()));
       this.classList.toggle("wide", words.textContent !== "");
       words.title = words.textContent ?? "";
@@ -122,7 +123,7 @@ function wordsOf(state, at) {
     const end = cut.reason ? text("preview.not_cut", { why: reasonText(cut.reason) }) : text("preview.cut");
     return `${approved}${cut.point_id}: ${end} · ${least([cut])}`;
   }
-  const seconds = state.duration_s.toFixed(1);
+  const seconds = decimal(state.duration_s, 1);
   const done = state.cuts.filter((each) => each.cut_s !== null).length;
   const all = state.cuts.length + state.remaining;
   const cuts =
@@ -141,7 +142,7 @@ function least(cuts) {
   return text("preview.least", {
     clearance: Math.round(1000 * nearest.clearance),
     between: nearest.between.map(labelOf).join("–"),
-    omega: omega.toFixed(3),
+    omega: decimal(omega, 3),
     margin: ((180 / Math.PI) * margin).toFixed(0),
   });
 }

@@ -3,7 +3,7 @@
 import { whyNot } from "../js/control/allowed.js";
 import { judge } from "../js/control/decisions.js";
 import { reasonIn } from "../js/link/api.js";
-import { clockWords, dateWords, spanWords } from "../js/state/format.js";
+import { clockWords, dateWords, decimal, spanWords } from "../js/state/format.js";
 import { points } from "../js/state/page-state.js";
 import { reasonText } from "../js/state/reasons.js";
 import { screen } from "../js/state/screens.js";
@@ -116,7 +116,7 @@ class RpReport extends HTMLElement {
         vine.not_cut,
         vine.unknown,
         vine.unreachable,
-        (vine.seconds / 60).toFixed(1),
+        decimal(vine.seconds / 60, 1),
       ]),
     );
     this.refusals.show(
@@ -145,8 +145,8 @@ class RpReport extends HTMLElement {
       ["unknown", count("unknown")],
       ["unreachable", count("unreachable")],
       ["called_wrong", cuts.filter((cut) => cut.wrong_by !== "").length],
-      ["mean", ended > 0 ? (seconds / ended).toFixed(1) : "–"],
-      ["vines_an_hour", atWork > 0 ? (worked / (atWork / 3600)).toFixed(1) : "–"],
+      ["mean", ended > 0 ? decimal(seconds / ended, 1) : "–"],
+      ["vines_an_hour", atWork > 0 ? decimal(worked / (atWork / 3600), 1) : "–"],
       ["refused", refusal_count],
     ]);
   }
@@ -207,7 +207,7 @@ class RpReport extends HTMLElement {
     const chip = element("span", { class: "chip", data: { outcome } }, icon(outcome), labelOf(outcome));
     const ended = cut.ended_at > 0;
     const facts = [
-      ended ? text("report.took", { time: clockWords(cut.ended_at), seconds: cut.seconds.toFixed(1) }) : text("report.now"),
+      ended ? text("report.took", { time: clockWords(cut.ended_at), seconds: decimal(cut.seconds, 1) }) : text("report.now"),
       ...(cut.user ? [text("report.accepted_by", { user: cut.user })] : []),
       ...(cut.wrong_by ? [text("report.called_wrong_by", { user: cut.wrong_by })] : []),
     ];

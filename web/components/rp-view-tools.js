@@ -13,6 +13,7 @@ import {
   setMeasuring,
   showLayer,
 } from "../js/control/view-tools.js";
+import { decimal } from "../js/state/format.js";
 import { link, now, pageState } from "../js/state/page-state.js";
 import { reason } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
@@ -138,6 +139,6 @@ function distanceWords() {
 
 /** @param {number} value */
 function metres(value) {
-  return value.toFixed(3).replace("-", "−");
+  return decimal(value, 3).replace("-", "−");
 }
 customElements.define("rp-view-tools", RpViewTools);

@@ -1,6 +1,6 @@
 // Readings of telemetry and charts: source, unit, format, warning limits.
 
-import { degrees, millimetres } from "../state/format.js";
+import { decimal, degrees, millimetres } from "../state/format.js";
 import { roundTrip } from "../state/page-state.js";
 
 /** @typedef {import("../link/messages.js").PageState} PageState */
@@ -72,7 +72,7 @@ export const READINGS = Object.freeze([
     unit: "ω",
     fullScale: 0.15,
     warnBelow: 0.02,
-    format: (/** @type {number} */ value) => value.toFixed(3),
+    format: (/** @type {number} */ value) => decimal(value, 3),
     read: (/** @type {PageState} */ state) => state.controller?.manipulability ?? null,
   },
   {
@@ -80,14 +80,14 @@ export const READINGS = Object.freeze([
     unit: "°",
     fullScale: 60,
     warnBelow: 5,
-    format: (/** @type {number} */ value) => value.toFixed(1),
+    format: (/** @type {number} */ value) => decimal(value, 1),
     read: (/** @type {PageState} */ state) => scaled(state.controller?.joint_margin, DEGREE),
   },
   {
     id: "base-speed",
     unit: "m/s",
     fullScale: 0.5,
-    format: (/** @type {number} */ value) => value.toFixed(2),
+    format: (/** @type {number} */ value) => decimal(value, 2),
     read: (/** @type {PageState} */ state) => speed.update(state.base, state.joints),
   },
   {
@@ -103,7 +103,7 @@ export const READINGS = Object.freeze([
     unit: "×",
     fullScale: 1.2,
     warnBelow: 0.9,
-    format: (/** @type {number} */ value) => value.toFixed(2),
+    format: (/** @type {number} */ value) => decimal(value, 2),
     read: (/** @type {PageState} */ state) => state.bridge?.real_time_factor ?? null,
   },
   {
@@ -147,7 +147,7 @@ export const READINGS = Object.freeze([
     unit: "ms",
     fullScale: 50,
     warnAbove: 50,
-    format: (/** @type {number} */ value) => value.toFixed(1),
+    format: (/** @type {number} */ value) => decimal(value, 1),
     read: (/** @type {PageState} */ state) => scaled(state.bridge?.round_trip_s, 1000),
   },
   {
