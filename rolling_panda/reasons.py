@@ -854,17 +854,17 @@ def cause_gone() -> None:
 
 @_reason("info", "")
 def acknowledge_resume() -> None:
-    """Press Acknowledge, then Resume."""
+    """Press I've checked, then Resume."""
 
 
 @_reason("info", "")
 def acknowledge_arm() -> None:
-    """Press Acknowledge, then Arm."""
+    """Press I've checked, then Arm."""
 
 
 @_reason("info", "")
 def supervisor_acknowledges() -> None:
-    """A supervisor presses Acknowledge, then Arm."""
+    """A supervisor presses I've checked, then Arm."""
 
 
 @_reason("info", "")

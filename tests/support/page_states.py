@@ -78,7 +78,6 @@ def _link_lost(page: Page, server: PlayedServer) -> None:
     server.online = False
     server.sockets[-1].close()
     expect(page.locator("rp-link-banner")).to_be_visible()
-    expect(page.locator('#alarms li[data-code="no_link"]')).to_be_visible()
 
 
 def _signed_out(page: Page, server: PlayedServer) -> None:

@@ -3,7 +3,7 @@
 import { COMMANDS, take, whyNotStep } from "../js/control/commands.js";
 import { clockWords } from "../js/state/format.js";
 import { link, now, pageState, points, preview } from "../js/state/page-state.js";
-import { partsOf, reasonText, severityOf } from "../js/state/reasons.js";
+import { partsOf, reasonText, sentence, severityOf } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
 import { counted, text } from "../js/state/texts.js";
 import { alarms } from "../js/views/alarms.js";
@@ -16,7 +16,6 @@ import { icon } from "../js/views/icons.js";
 const LINGER_MS = 2000;
 /** What a step of the advice asks to press. @type {Readonly<Record<string, Step>>} */
 const PRESSES = Object.freeze({
-  press_reset: "reset",
   acknowledge_resume: "Acknowledge",
   acknowledge_arm: "Acknowledge",
   press_resume: "Resume",
@@ -31,6 +30,12 @@ const PRESSES = Object.freeze({
   preview_start: "preview",
   approve_start: "preview",
 });
+
+/** These have banners of their own. */
+const ELSEWHERE = new Set(["mode_stopped", "no_link"]);
+
+/** Warnings that the work waits for. */
+const HALTS = new Set(["mode_paused", "work_waits"]);
 
 class RpAlarms extends HTMLElement {
   /** @type {Map<string, ReturnType<typeof newRow>>} */
@@ -51,7 +56,7 @@ class RpAlarms extends HTMLElement {
 
   /** @param {HTMLElement} more */
   draw(more) {
-    const found = alarms();
+    const found = alarms().filter(({ reason }) => !ELSEWHERE.has(reason.code));
     const at = performance.now();
     for (const { reason, steps } of found) {
       const row = this.rows.get(reason.code) ?? newRow(reason);
@@ -72,8 +77,8 @@ class RpAlarms extends HTMLElement {
     const first = sorted[0]?.row;
     this.hidden = !first;
     this.dataset.worst = first?.dataset.severity ?? "";
-    // Warnings that ask for nothing take no room from the view.
-    const quiet = sorted.every(({ row }) => row.dataset.severity !== "error" && row.dataset.asks === "");
+    // Other warnings take no room from the view.
+    const quiet = sorted.every(({ row }) => row.dataset.severity !== "error" && !HALTS.has(row.dataset.code ?? ""));
     const open = more.getAttribute("aria-expanded") === "true";
     this.classList.toggle("quiet", quiet && !open);
     for (const { row } of sorted) row.hidden = !open && (quiet || row !== first);
@@ -85,12 +90,7 @@ class RpAlarms extends HTMLElement {
 
 /** @param {HTMLElement} row */
 function rank(row) {
-  return Number(row.dataset.severity === "warning") + Number(row.dataset.asks === "") / 2;
-}
-
-/** @param {string} words */
-function sentence(words) {
-  return `${words.charAt(0).toUpperCase()}${words.slice(1)}.`;
+  return row.dataset.severity === "error" ? 0 : HALTS.has(row.dataset.code ?? "") ? 1 : 2;
 }
 
 /** @param {import("../js/state/reasons.js").Reason} reason */
@@ -102,7 +102,7 @@ function newRow(reason) {
   const press = element("button", { class: "alarm-press", onclick: () => step && take(step) });
   const row = element(
     "li",
-    { data: { severity, code: reason.code, asks: "" } },
+    { data: { severity, code: reason.code } },
     icon(severity),
     element("span", { class: "alarm-words" }, words, act),
     press,
@@ -124,7 +124,6 @@ function newRow(reason) {
       setText(words, parts.text);
       setText(act, [parts.act, ...steps.map(reasonText)].filter(Boolean).map(sentence).join(" "));
       act.dataset.steps = steps.map((each) => each.code).join(" ");
-      row.dataset.asks = act.dataset.steps;
       step = steps.map((each) => PRESSES[each.code]).find((each) => each && !whyNotStep(each));
       press.hidden = !step;
       if (step) setText(press, labelOf(step));

@@ -4,6 +4,7 @@ import { countOf } from "../js/control/allowed.js";
 import { COMMANDS, isCommand, surveyDistance, take, whyNotStep } from "../js/control/commands.js";
 import { nextStep, waitingForPerson } from "../js/control/next-step.js";
 import { closePreview, hasPreview, openPreview, previewOpen, whyNoPreview } from "../js/control/preview.js";
+import { timeLeft } from "../js/control/progress.js";
 import { durationWords } from "../js/state/format.js";
 import { link, now, pageState, points, preview, say } from "../js/state/page-state.js";
 import { screen } from "../js/state/screens.js";
@@ -17,9 +18,9 @@ import { menu } from "../js/views/menu.js";
 /** @typedef {{ box: HTMLElement, button: HTMLButtonElement, label: HTMLElement }} StepButton */
 
 /** @type {readonly Step[]} */
-const STEPS = Object.freeze([...COMMANDS, "review", "preview", "reset"]);
+const STEPS = Object.freeze([...COMMANDS, "review", "preview", "approve", "reset"]);
 /** The icon of each step; of another one, its own name. @type {Readonly<Partial<Record<Step, string>>>} */
-const ICONS = Object.freeze({ Arm: "READY", Start: "AUTO", Resume: "AUTO", Pause: "PAUSED", Acknowledge: "present" });
+const ICONS = Object.freeze({ Arm: "READY", Start: "AUTO", Resume: "AUTO", Pause: "PAUSED", Acknowledge: "present", approve: "present", preview: "AUTO", reset: "present" });
 /** Lengths of a survey (m). */
 const DISTANCES = Object.freeze([1, 2, 4, 8, 15, 30, 60, 120]);
 
@@ -115,8 +116,8 @@ function labelOf(step) {
     case "Start": {
       const count = countOf("ACCEPTED");
       if (count === 0) return text("command.Start");
-      const plan = points.get()?.plan;
-      const time = plan?.state === "valid" ? ` · ~${durationWords(plan.duration_s)}` : "";
+      const seconds = timeLeft();
+      const time = seconds ? ` · ~${durationWords(seconds)}` : "";
       return counted("bar.start", count) + time;
     }
     case "review":
@@ -124,6 +125,7 @@ function labelOf(step) {
     case "Acknowledge":
       return text("bar.checked");
     case "preview":
+    case "approve":
     case "reset":
       return text(`bar.${step}`);
     default:

@@ -1,8 +1,10 @@
 // The tabs of the screens. A screen is fetched when it is first opened; later it is only shown and hidden.
 
+import { waitingForPerson } from "../js/control/next-step.js";
+import { points } from "../js/state/page-state.js";
 import { SCREENS, screen } from "../js/state/screens.js";
 import { drawOn } from "../js/state/signals.js";
-import { text } from "../js/state/texts.js";
+import { counted, text } from "../js/state/texts.js";
 import { element, setAttribute, setText } from "../js/views/dom.js";
 import { icon } from "../js/views/icons.js";
 
@@ -15,6 +17,18 @@ const FETCH = Object.freeze({
   engineer: () => import("./rp-engineer.js"),
 });
 
+/** How much waits for a person. */
+function badge() {
+  const count = element("span", { class: "badge number" });
+  drawOn([points], () => {
+    const waiting = waitingForPerson();
+    count.hidden = waiting === 0;
+    setText(count, String(waiting));
+    count.setAttribute("aria-label", counted("bar.needs_you", waiting));
+  });
+  return count;
+}
+
 class RpScreens extends HTMLElement {
   connectedCallback() {
     this.setAttribute("role", "navigation");
@@ -22,6 +36,7 @@ class RpScreens extends HTMLElement {
     const tabs = SCREENS.map((name) => {
       const words = element("span", { text: text(`screen.${name}`) });
       const tab = element("a", { data: { tab: name }, attributes: { href: `#${name}` } }, icon(name), words);
+      if (name === "review") tab.append(badge());
       drawOn([screen], () => setAttribute(tab, "aria-current", screen.get() === name ? "page" : ""));
       return tab;
     });

@@ -5,9 +5,10 @@ import { earlierWords, hardwareStopPressed, sinceWords, stopProgress } from "../
 import { ask } from "../js/link/api.js";
 import { TEXT_MAX_LENGTH } from "../js/link/messages.js";
 import { isLive, link, now, pageState, staleWords } from "../js/state/page-state.js";
-import { reason, reasonText } from "../js/state/reasons.js";
+import { reason, reasonText, sentence } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
 import { text } from "../js/state/texts.js";
+import { alarms } from "../js/views/alarms.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
 import { icon, setIcon } from "../js/views/icons.js";
 
@@ -32,6 +33,7 @@ class RpStopBanner extends HTMLElement {
     const reset = element("button", { id: "reset", text: text("stop.reset"), attributes: { type: "submit" } });
     const form = element("form", {}, words, reset);
     const hint = element("p", { class: "hint", text: text("stop.reset_moves_nothing") });
+    const act = element("p", { class: "act" });
     form.addEventListener("submit", async (event) => {
       event.preventDefault();
       // With the id of the stop shown: a newer one must not be reset unseen.
@@ -42,6 +44,7 @@ class RpStopBanner extends HTMLElement {
       element("div", { class: "banner-head" }, icon("ESTOP_LATCHED"), title, who),
       element("ul", { class: "acknowledgements" }, bridge.row, controller.row),
       earlier,
+      act,
       form,
       hint,
     );
@@ -68,6 +71,9 @@ class RpStopBanner extends HTMLElement {
       const before = earlierWords(state);
       earlier.hidden = before === "";
       setText(earlier, before);
+      const steps = alarms().find((alarm) => alarm.reason.code === "mode_stopped")?.steps ?? [];
+      setText(act, steps.map((step) => sentence(reasonText(step))).join(" "));
+      act.dataset.steps = steps.map((step) => step.code).join(" ");
       const pressed = hardwareStopPressed(state) ? reason("emergency_stop_pressed") : null;
       const why = pressed ?? whyNot("Reset") ?? (words.value.trim() === "" ? reason("reset_unexplained") : null);
       setEnabled(reset, why, text("stop.reset_hint"));

@@ -20,6 +20,7 @@ import { drawOn } from "../js/state/signals.js";
 import { labelOf, text } from "../js/state/texts.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
 import { icon } from "../js/views/icons.js";
+import { menu } from "../js/views/menu.js";
 
 /** Camera and 3-D view change places by a press of the smaller one. */
 class RpSwap extends HTMLElement {
@@ -68,19 +69,11 @@ class RpViewTools extends HTMLElement {
     const measure = element("button", { id: "measure", text: text("measure.begin"), attributes: { "aria-keyshortcuts": "M" } });
     measure.addEventListener("click", () => setMeasuring(!measuring.get()));
 
-    const list = element("div", { id: "layers", class: "layers" });
-    list.hidden = true;
-    const open = element("button", {
-      id: "show-layers",
-      text: text("layers.title"),
-      attributes: { "aria-expanded": "false", "aria-controls": "layers", title: text("layers.hint") },
-    });
-    const show = (/** @type {boolean} */ shown) => {
-      list.hidden = !shown;
-      open.setAttribute("aria-expanded", String(shown));
-    };
-    open.addEventListener("click", () => show(list.hidden === true));
-    this.addEventListener("keydown", (event) => event.key === "Escape" && show(false));
+    const list = element("div", { id: "layers", class: "menu" });
+    const open = element("button", { id: "show-layers", text: text("layers.title"), attributes: { title: text("layers.hint") } });
+    // Where there is little room, the others are behind a button, too.
+    const places = element("div", { id: "view-places", class: "places" }, ...presets, measure);
+    const more = element("button", { id: "show-view", text: text("layers.view") });
     for (const layer of LAYERS) {
       const box = element("input", { data: { layer }, attributes: { type: "checkbox" } });
       box.addEventListener("change", () => showLayer(layer, box.checked));
@@ -94,13 +87,13 @@ class RpViewTools extends HTMLElement {
       element(
         "div",
         { class: "tools", attributes: { role: "toolbar", "aria-label": text("layers.tools") } },
-        ...presets,
-        measure,
-        open,
+        element("div", { class: "folded" }, more, places),
+        element("div", { class: "layers" }, open, list),
       ),
-      list,
       words,
     );
+    menu(open, list);
+    menu(more, places);
 
     drawOn([measuring, measured, placing, link, pageState, now], () => {
       const on = measuring.get();

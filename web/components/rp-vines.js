@@ -1,11 +1,11 @@
 // The row at a glance, below the header: a bar for each vine, how many cuts are decided and done, and the time left.
 
-import { vines } from "../js/control/progress.js";
+import { timeLeft, vines } from "../js/control/progress.js";
 import { durationWords } from "../js/state/format.js";
 import { points } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
 import { text } from "../js/state/texts.js";
-import { element, setAttribute, setText } from "../js/views/dom.js";
+import { element, keepRows, setAttribute, setText } from "../js/views/dom.js";
 
 class RpVines extends HTMLElement {
   connectedCallback() {
@@ -14,23 +14,10 @@ class RpVines extends HTMLElement {
     const list = element("ul");
     const words = element("p", { class: "number", attributes: { role: "status" } });
     this.append(list, words);
-    /** @type {Map<number, ReturnType<typeof vineBar>>} */
-    const bars = new Map();
+    const bars = keepRows(list, vineBar);
     drawOn([points], () => {
       const found = vines();
-      const kept = new Set(found.map((each) => each.vine));
-      for (const [vine, bar] of bars) {
-        if (kept.has(vine)) continue;
-        bar.item.remove();
-        bars.delete(vine);
-      }
-      for (const vine of found) {
-        const bar = bars.get(vine.vine) ?? vineBar(vine.vine);
-        bars.set(vine.vine, bar);
-        bar.show(vine);
-        // In the order of the row.
-        list.append(bar.item);
-      }
+      bars(found.map((vine) => [String(vine.vine), vine]));
       setText(words, wordsOf(found));
     });
   }
@@ -40,18 +27,18 @@ class RpVines extends HTMLElement {
 function wordsOf(all) {
   const sum = (/** @type {"done"|"count"} */ name) => all.reduce((total, vine) => total + vine[name], 0);
   if (sum("count") === 0) return text("vines.none");
-  const plan = points.get()?.plan;
-  const left = plan?.state === "valid" && plan.duration_s > 0 ? ` · ${text("vines.left", { time: durationWords(plan.duration_s) })}` : "";
+  const seconds = timeLeft();
+  const left = seconds ? ` · ${text("vines.left", { time: durationWords(seconds) })}` : "";
   return text("vines.done", { done: sum("done"), count: sum("count") }) + left;
 }
 
-/** @param {number} vine */
+/** @param {string} vine Its number. */
 function vineBar(vine) {
   const done = element("span", { class: "vine-done" });
   const decided = element("span", { class: "vine-decided" });
   const item = element(
     "li",
-    { data: { vine: String(vine) } },
+    { data: { vine } },
     element("span", { class: "vine-name", text: text("vines.vine", { vine }) }),
     element("span", { class: "vine-bar" }, decided, done),
   );

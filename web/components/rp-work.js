@@ -1,47 +1,143 @@
-// The screen for the work: what the robot does now, and the cuts with their states.
+// The screen for the work: the cut under way or the chosen one, what waits for a person, and the cuts vine by vine.
 
-import { selectAndReveal } from "../js/control/selection.js";
-import { pageState, points, selected } from "../js/state/page-state.js";
+import { countOf } from "../js/control/allowed.js";
+import { isUncertain } from "../js/control/decisions.js";
+import { cutTime } from "../js/control/order.js";
+import { cuts, cutToShow, vines } from "../js/control/progress.js";
+import { select, selectAndReveal } from "../js/control/selection.js";
+import { link, now, pageState, points, revealCount, selected, staleWords } from "../js/state/page-state.js";
 import { reasonText } from "../js/state/reasons.js";
+import { screen } from "../js/state/screens.js";
 import { drawOn } from "../js/state/signals.js";
-import { labelOf, text } from "../js/state/texts.js";
-import { element, setAttribute, setText } from "../js/views/dom.js";
+import { counted, labelOf, text } from "../js/state/texts.js";
+import { element, keepRows, setAttribute, setText } from "../js/views/dom.js";
 import { setIcon } from "../js/views/icons.js";
 
 /** @typedef {import("../js/link/messages.js").PagePoint} PagePoint */
 
+/** Height of a vine's heading, which stays in sight (px). */
+const HEADING = 40;
+/** A picture that is not there yet is asked for again after this time (ms). */
+const AGAIN_MS = 2000;
+
 class RpWork extends HTMLElement {
+  list = element("ol", { class: "cuts", attributes: { "aria-label": text("work.cuts") } });
+  /** Scrolls below the cut, where there is room for both. */
+  rest = element("div", { class: "work-rest" });
+
   connectedCallback() {
-    const words = element("p", { class: "work-now", attributes: { role: "status" } });
-    const list = element("ol", { class: "cuts", attributes: { "aria-label": text("work.cuts") } });
+    const stale = element("p", { class: "stale-note", attributes: { role: "status" } });
     const empty = element("p", { class: "empty", text: text("work.none") });
-    this.append(words, list, empty);
-    drawOn([pageState], () => setText(words, reasonText(pageState.get()?.controller?.reason)));
-    /** @type {Map<string, ReturnType<typeof cutRow>>} */
-    const rows = new Map();
-    drawOn([points, selected], () => {
-      const wanted = (points.get()?.points ?? []).filter((row) => row.entry.state !== "REJECTED");
-      const kept = new Set(wanted.map((row) => row.point.point_id));
-      for (const [name, row] of rows) {
-        if (kept.has(name)) continue;
-        row.item.remove();
-        rows.delete(name);
-      }
-      let previous = /** @type {Element|null} */ (null);
-      for (const each of wanted) {
-        const name = each.point.point_id;
-        const row = rows.get(name) ?? cutRow(name);
-        rows.set(name, row);
-        row.show(each);
-        if (row.item !== (previous ? previous.nextElementSibling : list.firstElementChild)) {
-          if (previous) previous.after(row.item);
-          else list.prepend(row.item);
-        }
-        previous = row.item;
-      }
-      empty.hidden = wanted.length > 0;
+    this.rest.append(this.list, empty);
+    this.append(stale, theCut(), needs(), this.rest);
+    drawOn([pageState, link, now], () => setText(stale, staleWords("controller", "perception")));
+    const groups = keepRows(this.list, vineGroup);
+    drawOn([points, selected, pageState], () => {
+      empty.hidden = cuts().length > 0;
+      groups(vines().map((vine) => [String(vine.vine), vine]));
     });
+    drawOn([selected, revealCount, screen], () => this.reveal());
   }
+
+  /** Scroll only the list to the chosen cut. */
+  reveal() {
+    const row = this.list.querySelector('[aria-current="true"]');
+    if (!row || this.rest.scrollHeight <= this.rest.clientHeight) return;
+    const [box, frame] = [row.getBoundingClientRect(), this.rest.getBoundingClientRect()];
+    const top = frame.top + HEADING;
+    if (box.top < top) this.rest.scrollTop += box.top - top;
+    else if (box.bottom > frame.bottom) this.rest.scrollTop += box.bottom - frame.bottom;
+  }
+}
+
+/** The cut that matters now: its place, state, picture and reason. Its size is the same for every cut. */
+function theCut() {
+  const count = element("p", { class: "work-count number" });
+  const name = element("h2");
+  const state = element("p", { class: "work-state", attributes: { role: "status" } });
+  const picture = element("img", { class: "work-picture", attributes: { alt: text("work.picture") } });
+  const why = element("p", { class: "hint" });
+  const open = element("a", { class: "button", text: text("work.open"), attributes: { href: "#review" } });
+  const box = element("section", { class: "work-cut" }, count, name, state, picture, why, open);
+  let of = "";
+  // Asked for again where it is not there yet.
+  picture.addEventListener("error", () => {
+    const missing = picture.src;
+    window.setTimeout(() => {
+      if (picture.src === missing) picture.src = missing;
+    }, AGAIN_MS);
+  });
+  picture.addEventListener("load", () => picture.classList.add("loaded"));
+  open.addEventListener("click", () => select(of));
+  drawOn([points, pageState, selected], () => {
+    const controller = pageState.get()?.controller ?? null;
+    const row = cutToShow(controller?.active_point_id ?? "", selected.get());
+    box.hidden = !row;
+    if (!row) return;
+    const { point, entry } = row;
+    const all = cuts();
+    of = point.point_id;
+    box.dataset.state = entry.state;
+    setText(count, text("work.count", { number: all.indexOf(row) + 1, count: all.length }));
+    setText(name, text("work.place", { vine: point.vine, spur: point.spur }));
+    setText(state, stateWords(row, controller?.phase ?? ""));
+    const words = reasonText(entry.reason) || reasonText(point.reason);
+    setText(why, words);
+    why.title = words;
+    const path = `api/points/${encodeURIComponent(of)}/picture?of=${point.digest}`;
+    if (picture.getAttribute("src") === path) return;
+    picture.classList.remove("loaded");
+    picture.src = path;
+  });
+  return box;
+}
+
+/**
+ * @param {PagePoint} row
+ * @param {import("../js/link/messages.js").Phase} phase
+ */
+function stateWords({ point, entry, plan }, phase) {
+  const active = pageState.get()?.controller?.active_point_id === point.point_id;
+  const doing = active && phase ? ` · ${text(`phase.${phase}`)}` : "";
+  const time = entry.state === "ACCEPTED" && plan ? cutTime(plan) : "";
+  return `${labelOf(entry.state)}${doing}${!doing && time ? ` · ${time}` : ""}`;
+}
+
+/** What waits for a person, and the way there. */
+function needs() {
+  const link = element("a", { class: "button needs", attributes: { href: "#review" } });
+  drawOn([points], () => {
+    const unsure = (points.get()?.points ?? []).filter(isUncertain).length;
+    const sure = countOf("PROPOSED") - unsure;
+    const places = points.get()?.undecided_sites.filter((site) => site.needs === "operator").length ?? 0;
+    const all = [
+      countOf("UNKNOWN") > 0 ? counted("work.unknown", countOf("UNKNOWN")) : "",
+      sure > 0 ? counted("work.sure", sure) : "",
+      unsure > 0 ? counted("work.unsure", unsure) : "",
+      places > 0 ? counted("work.places", places) : "",
+      countOf("UNREACHABLE") > 0 ? counted("work.beyond", countOf("UNREACHABLE")) : "",
+    ].filter(Boolean);
+    const words = all.length > 0 ? all.join(" · ") : text("work.nothing");
+    link.classList.toggle("calm", all.length === 0);
+    setText(link, words);
+    link.title = words;
+  });
+  return link;
+}
+
+/** The cuts of a vine below its name and count. @param {string} name Its number. */
+function vineGroup(name) {
+  const heading = element("h3");
+  const list = element("ol", { attributes: { "aria-label": text("work.vine", { vine: name }) } });
+  const rows = keepRows(list, cutRow);
+  return {
+    item: element("li", {}, heading, list),
+    /** @param {import("../js/control/progress.js").VineProgress} vine */
+    show(vine) {
+      setText(heading, text("work.group", { vine: vine.vine, done: vine.done, count: vine.count }));
+      rows(cuts().filter(({ point }) => point.vine === vine.vine).map((row) => [row.point.point_id, row]));
+    },
+  };
 }
 
 /** @param {string} name */
@@ -56,7 +152,7 @@ function cutRow(name) {
     show({ point, entry }) {
       item.dataset.state = entry.state;
       setIcon(shape, entry.state);
-      setText(place, text("work.place", { vine: point.vine, spur: point.spur }));
+      setText(place, text("work.spur", { spur: point.spur }));
       setText(state, labelOf(entry.state));
       setAttribute(button, "aria-current", selected.get() === name ? "true" : "");
     },

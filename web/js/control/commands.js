@@ -5,10 +5,10 @@ import { openScreen } from "../state/screens.js";
 import { signal } from "../state/signals.js";
 import { text } from "../state/texts.js";
 import { whyNot } from "./allowed.js";
-import { openPreview } from "./preview.js";
+import { approvePreview, openPreview, whyNoApproval } from "./preview.js";
 
 /** @typedef {"Arm"|"Survey"|"Start"|"Pause"|"Resume"|"Home"|"Acknowledge"} CommandName */
-/** @typedef {CommandName|"review"|"preview"|"reset"} Step */
+/** @typedef {CommandName|"review"|"preview"|"approve"|"reset"} Step */
 
 /** @type {readonly CommandName[]} */
 export const COMMANDS = Object.freeze(["Arm", "Survey", "Start", "Pause", "Resume", "Home", "Acknowledge"]);
@@ -22,6 +22,7 @@ export function isCommand(step) {
 
 /** Why a step is not possible now. @param {Step} step */
 export function whyNotStep(step) {
+  if (step === "approve") return whyNoApproval();
   return isCommand(step) ? whyNot(step) : null;
 }
 
@@ -33,6 +34,9 @@ export function take(step) {
       break;
     case "preview":
       openPreview();
+      break;
+    case "approve":
+      void approvePreview();
       break;
     case "reset":
       document.getElementById("reset-reason")?.focus();

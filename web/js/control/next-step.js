@@ -3,6 +3,7 @@
 import { pageState, points, preview } from "../state/page-state.js";
 import { screen } from "../state/screens.js";
 import { countOf } from "./allowed.js";
+import { previewOpen } from "./preview.js";
 
 /** @typedef {import("./commands.js").Step} Step */
 
@@ -34,10 +35,16 @@ export function nextStep() {
  */
 function whenReady(surveying) {
   if (surveying) return "Survey";
-  const told = preview.get();
-  if (countOf("ACCEPTED") > 0) return told?.required && told.phase !== "approved" ? "preview" : "Start";
+  if (countOf("ACCEPTED") > 0) return withPreview();
   if (countOf("PROPOSED") === 0) return "Survey";
   return screen.get() === "review" ? "Start" : "review";
+}
+
+/** @returns {Step} */
+function withPreview() {
+  const told = preview.get();
+  if (!told?.required || told.phase === "approved") return "Start";
+  return told.phase === "ready" && previewOpen.get() ? "approve" : "preview";
 }
 
 /** How many points and places wait for a decision. */

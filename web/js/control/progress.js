@@ -1,22 +1,43 @@
-// How far the work on the row is, vine by vine.
+// How far the work on the row is: vine by vine, and the time that is left.
 
 import { points } from "../state/page-state.js";
 
+/** @typedef {import("../link/messages.js").PagePoint} PagePoint */
 /**
- * Cuts of one vine: how many there are, are decided about, and are done. What a person left is none.
+ * Cuts of one vine: how many there are, are decided about, and are done. What a person left is none of them.
  *
  * @typedef {{ vine: number, count: number, decided: number, done: number }} VineProgress
  */
 
 /** States in which a person still has to decide. */
 const OPEN = new Set(["PROPOSED", "UNKNOWN"]);
+/** States of what is still to be cut. */
+const AHEAD = new Set(["ACCEPTED", "CUTTING"]);
+
+/** The cuts in the order of the row, without those that a person left. */
+export function cuts() {
+  const all = (points.get()?.points ?? []).filter((row) => row.entry.state !== "REJECTED");
+  return all.sort((a, b) => a.point.vine - b.point.vine || a.point.spur - b.point.spur);
+}
+
+/**
+ * The cut that the robot is at, or the chosen one, or the next one.
+ *
+ * @param {string} active
+ * @param {string} chosen
+ */
+export function cutToShow(active, chosen) {
+  const all = points.get()?.points ?? [];
+  const named = (/** @type {string} */ name) => all.find(({ point }) => point.point_id === name);
+  // The points come in the order of work.
+  return named(active) ?? named(chosen) ?? all.find(({ entry }) => AHEAD.has(entry.state)) ?? cuts()[0];
+}
 
 /** @returns {VineProgress[]} In the order of the row. */
 export function vines() {
   /** @type {Map<number, VineProgress>} */
   const found = new Map();
-  for (const { point, entry } of points.get()?.points ?? []) {
-    if (entry.state === "REJECTED") continue;
+  for (const { point, entry } of cuts()) {
     const vine = found.get(point.vine) ?? { vine: point.vine, count: 0, decided: 0, done: 0 };
     vine.count += 1;
     vine.decided += Number(!OPEN.has(entry.state));
@@ -24,4 +45,14 @@ export function vines() {
     found.set(point.vine, vine);
   }
   return [...found.values()].sort((a, b) => a.vine - b.vine);
+}
+
+/** Time for what is still to be cut (s); null where it is not known, and 0 where nothing is. */
+export function timeLeft() {
+  const ahead = cuts().filter((row) => AHEAD.has(row.entry.state));
+  const times = ahead.flatMap(({ plan }) => (plan?.rollout ? [plan.rollout.ends_s - plan.rollout.begins_s] : []));
+  const known = times.reduce((sum, each) => sum + each, 0);
+  if (ahead.length === 0) return 0;
+  // A cut that is not rolled out yet counts as the mean of the others.
+  return times.length > 0 ? (known * ahead.length) / times.length : null;
 }

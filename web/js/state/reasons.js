@@ -62,6 +62,11 @@ export function reasonText(reason) {
   return told.act ? text("advice", { text: told.text, act: told.act }) : told.text;
 }
 
+/** @param {string} words */
+export function sentence(words) {
+  return `${words.charAt(0).toUpperCase()}${words.slice(1)}.`;
+}
+
 /**
  * The words of a person; empty where a reason has none.
  *

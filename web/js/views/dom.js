@@ -120,3 +120,31 @@ export function panelHead(title, ...extra) {
   const note = element("span", { class: "stale-note", attributes: { role: "status" } });
   return { head: element("div", { class: "panel-head" }, element("h2", { text: title }), note, ...extra), note };
 }
+
+/**
+ * Keep the children of a list up to date by their names, moving as few as possible, so that focus and scroll position
+ * stay.
+ *
+ * @template T
+ * @param {Element} list Has no other children.
+ * @param {(name: string) => { item: Element, show: (value: T) => void }} create Makes a child.
+ * @returns {(wanted: readonly (readonly [name: string, value: T])[]) => void} Shows these, in this order.
+ */
+export function keepRows(list, create) {
+  /** @type {Map<string, { item: Element, show: (value: T) => void }>} */
+  const rows = new Map();
+  return (wanted) => {
+    const kept = new Set(wanted.map(([name]) => name));
+    for (const [name, { item }] of rows) {
+      if (kept.has(name)) continue;
+      item.remove();
+      rows.delete(name);
+    }
+    wanted.forEach(([name, value], at) => {
+      const row = rows.get(name) ?? create(name);
+      rows.set(name, row);
+      if (list.children[at] !== row.item) list.insertBefore(row.item, list.children[at] ?? null);
+      row.show(value);
+    });
+  };
+}
