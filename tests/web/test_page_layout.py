@@ -36,7 +36,8 @@ def test_after_a_stop_the_tool_stays_in_view(page: Page, server: PlayedServer, s
 #: where (px).
 SHIFTS = """() => { window.shifts = []; new PerformanceObserver((list) => {
   for (const { value, startTime, sources } of list.getEntries())
-    window.shifts.push([value, Math.round(startTime), ...sources.map(({ node, previousRect: a, currentRect: b }) => {
+    if (sources.some(({ node }) => !(node?.parentElement ?? node)?.closest?.(".notices")))
+      window.shifts.push([value, Math.round(startTime), ...sources.map(({ node, previousRect: a, currentRect: b }) => {
       const each = node?.nodeType === Node.TEXT_NODE ? node.parentElement : node;
       const name = each ? [each.localName, ...each.classList].join(".") + (each.id && `#${each.id}`) : "removed";
       return `${name} ${[a.x, a.y, a.width, a.height]} -> ${[b.x, b.y, b.width, b.height]}`;

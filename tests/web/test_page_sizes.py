@@ -89,6 +89,8 @@ def test_the_view_has_most_of_the_window_and_no_banner_takes_any_of_it(
     page: Page, server: PlayedServer, subtests: pytest.Subtests
 ) -> None:
     def at_every_size(state: str, over: str = "") -> None:
+        # A step that has just come takes no press yet.
+        page.wait_for_timeout(450)
         for width, height in SIZES:
             page.set_viewport_size({"width": width, "height": height})
             with subtests.test(state=state, size=f"{width}x{height}"):
@@ -113,7 +115,7 @@ def test_the_view_has_most_of_the_window_and_no_banner_takes_any_of_it(
     at_every_size("no link", ".stage")
 
 
-@pytest.mark.parametrize("name", ["work", "review", "drive", "report", "engineer"])
+@pytest.mark.parametrize("name", ["review", "drive", "report", "engineer"])
 def test_a_screen_that_is_left_and_opened_again_is_as_it_was(page: Page, name: str) -> None:
     """The 3-D view is never loaded anew, and the address names the screen."""
     page.frames[1].evaluate("() => { window.same = true; }")
