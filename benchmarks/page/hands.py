@@ -68,7 +68,7 @@ def open_page(context: "BrowserContext") -> "Page":
     """The page, with detections on it and its 3-D view."""
     page = context.new_page()
     page.goto("/")
-    page.wait_for_selector("[data-point-id]", timeout=90_000)
+    page.wait_for_selector("[data-cut]", timeout=90_000)
     page.wait_for_selector("rp-scene iframe.loaded", timeout=90_000)
     page.wait_for_timeout(3000)
     return page
@@ -83,6 +83,7 @@ def drag(page: "Page", demo: Demo, record: Path, count: int, seed: int, found: D
     if demo.in_mode("IDLE"):
         demo.post("arm")
     demo.wait(lambda: demo.in_mode("READY"), 20.0)
+    page.click('[data-tab="drive"]')
     page.wait_for_selector('#teleop[aria-disabled="false"]', timeout=20_000)
     if page.get_attribute("#teleop", "aria-pressed") == "false":
         page.click("#teleop")
@@ -99,7 +100,7 @@ def drag(page: "Page", demo: Demo, record: Path, count: int, seed: int, found: D
         hand.let_go()
         page.wait_for_timeout(_SETTLE_MS)
         _answers(moved, trace.read(record).rows, found)
-    page.click("#teleop")
+    page.click('[data-tab="work"]')
     demo.wait(lambda: demo.in_mode("READY"), 10.0)
 
 

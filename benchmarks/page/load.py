@@ -82,7 +82,7 @@ def page_cost(demo: Demo, chromium: str, seconds: float, without: Cost) -> PageC
         wire.on("Network.loadingFinished", fetched)
         wire.send("Network.enable")
         page.goto(link)
-        page.wait_for_selector("[data-point-id]", timeout=90_000)
+        page.wait_for_selector("[data-cut]", timeout=90_000)
         page.wait_for_timeout(15_000)
         browser_tree = [p for p in psutil.Process(os.getpid()).children(recursive=True) if "chrom" in p.name()]
         before, began, already = sum(_spent(p) for p in browser_tree), time.monotonic(), received

@@ -30,7 +30,7 @@ FLAGS = (
     "--enable-unsafe-swiftshader",
     "--ignore-gpu-blocklist",
 )
-DESKTOP, TABLET = (1280, 800), (1024, 768)
+DESKTOP, TABLET, TELEPHONE = (1280, 800), (1024, 768), (390, 844)
 #: So many colours are enough for a page, and a third of the size.
 COLOURS = 64
 STILL = "view.jpg"
@@ -38,32 +38,14 @@ _PATIENCE_MS = 60_000
 
 #: Played states: what of the page is shown. All of it where nothing is said.
 PARTS = {
-    "rule": "rp-queue",
-    "order": "rp-queue",
-    "why-rejected": "rp-queue",
-    "places": "rp-queue",
-    "all-states": "rp-queue",
-    "refused-plan": "rp-queue",
-    "unknown-cut": "rp-queue",
-    "by-hand": "main",
-    "preview-expired": ".middle",
-    "held-back": ".middle",
-    "teleoperate-base": ".middle",
-    "teleoperate-joints": ".middle",
-    "stop-pressed": ".middle",
-    "paused": ".top",
-    "survey": ".top",
-    "fault": ".top",
-    "asked-for-control": ".top",
-    "other-has-control": ".top",
-    "invite": ".top, .invitation",
-    "viewer": ".top",
-    "refused": ".middle, rp-toasts",
-    "replay": "rp-replay",
-    "signed-out": ".middle, rp-link-banner",
+    "invite": ".top, #person-menu",
+    "asked-for-control": ".top, rp-lease",
+    "other-has-control": ".top, rp-lease",
+    "replay": ".top, rp-replay",
 }
-#: What is shown on a tablet, in the dark, too.
-DARK = ("points", "stopped", "charts")
+#: What is shown on a tablet, in the dark, too; and on a telephone.
+DARK = ("points", "running", "stopped", "charts")
+SMALL = ("points", "running", "stopped", "teleoperate-base", "report")
 
 
 class Album:
@@ -84,7 +66,8 @@ class Album:
 
     def keep_still(self, page: Any) -> None:
         """Keep the 3-D view alone, for states that are played."""
-        shown = "on => { document.querySelector('rp-view-tools').style.visibility = on ? '' : 'hidden' }"
+        shown = """on => { for (const each of document.querySelectorAll(".stage > :not(rp-scene)"))
+          each.style.visibility = on ? "" : "hidden"; }"""
         page.evaluate(shown, False)
         page.locator("rp-scene").screenshot(path=self.folder / STILL, type="jpeg", quality=70)
         page.evaluate(shown, True)
@@ -133,6 +116,7 @@ def played(launch: Callable[[list[str]], Any], album: Album, only: Sequence[str]
     still = album.folder / STILL
     wanted = [(name, DESKTOP, "light", name, PARTS.get(name, "")) for name in states.STATES]
     wanted += [(name, TABLET, "dark", f"tablet-{name}", "") for name in DARK]
+    wanted += [(name, TELEPHONE, "light", f"telephone-{name}", "") for name in SMALL]
     for name, size, scheme, called, part in wanted:
         if only and called not in only:
             continue

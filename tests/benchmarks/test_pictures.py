@@ -19,12 +19,12 @@ FOLDER = pictures.ROOT / "docs/images/page"
 def test_a_picture_is_of_the_part_that_matters_in_few_colours(page: Page, tmp_path: Path) -> None:
     album = pictures.Album(tmp_path / "new")
     album.take(page, "all")
-    album.take(page, "two", "rp-queue, rp-camera")
+    album.take(page, "two", "rp-work, rp-camera")
     with Image.open(tmp_path / "new/all.png") as all_of_it, Image.open(tmp_path / "new/two.png") as part:
         assert all_of_it.size == (1280, 800)
-        queue, camera = box_of(page.locator("rp-queue")), box_of(page.locator("rp-camera"))
-        assert part.width == pytest.approx(camera["x"] + camera["width"] - queue["x"] + 16, abs=2)
-        assert part.height == pytest.approx(queue["height"] + 16, abs=2)
+        work, camera = box_of(page.locator("rp-work")), box_of(page.locator("rp-camera"))
+        assert part.width == pytest.approx(work["x"] + work["width"] - camera["x"] + 16, abs=2)
+        assert part.height == pytest.approx(work["height"] + 16, abs=2)
         assert len(part.convert("RGB").getcolors() or ()) in range(16, pictures.COLOURS + 1)
 
 
@@ -32,7 +32,7 @@ def test_every_state_is_pictured_and_the_folder_is_small() -> None:
     taken = {path.stem for path in FOLDER.glob("*.png")}
     assert set(STATES) <= taken, "take them with `rolling-panda bench pictures`"
     assert sum(path.stat().st_size for path in FOLDER.iterdir()) < 3e6
-    assert set(pictures.PARTS) | set(pictures.DARK) <= set(STATES)
+    assert set(pictures.PARTS) | set(pictures.DARK) | set(pictures.SMALL) <= set(STATES)
 
 
 @pytest.mark.parametrize("document", ["README.md", "docs/operator-guide.md"])

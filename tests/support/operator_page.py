@@ -45,3 +45,12 @@ def operator_page(
         finally:
             browser.close()
     assert not foreign, f"the page asked another origin: {foreign}"
+
+
+def accept(page: Page, point_id: str) -> None:
+    """Choose a cut in the list, open it and accept it, as an operator does."""
+    page.click('[data-tab="work"]')
+    page.click(f'[data-cut="{point_id}"] button')
+    page.click('[data-tab="review"]')
+    page.click(f'rp-point[data-point-id="{point_id}"] button.accept')
+    page.click('[data-tab="work"]')

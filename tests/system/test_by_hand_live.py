@@ -47,7 +47,8 @@ def beside_line(point: list[float], line: dict) -> float:
 
 def test_clicks_on_canes_in_the_view_and_in_the_image_place_points(tmp_path: Path, chromium_path: str) -> None:
     with LiveRobot(tmp_path, seed=4) as robot, operator_page(chromium_path, robot.link("ada"), scale=1.0) as page:
-        page.wait_for_selector('[data-point-id][data-state="PROPOSED"]', timeout=90_000)
+        page.wait_for_selector('[data-cut][data-state="PROPOSED"]', timeout=90_000)
+        page.click('[data-tab="review"]')
         page.click("#add-by-hand")
         page.wait_for_function("document.querySelector('rp-scene iframe').classList.contains('loaded')")
         robot.wait(lambda: len(blue_places(page)) > 50, 30, "the known canes to be drawn")
@@ -69,6 +70,7 @@ def test_clicks_on_canes_in_the_view_and_in_the_image_place_points(tmp_path: Pat
             assert answer["ok"] or answer["code"] in BESIDE
 
         # In the camera image 50 px above the mark of a cut is the same cane, mostly.
+        page.click("#swap")
         box = page.locator("rp-camera .picture svg").bounding_box()
         assert box is not None
         size = robot.client.get("/api/points").json()["image_size"]
@@ -77,4 +79,4 @@ def test_clicks_on_canes_in_the_view_and_in_the_image_place_points(tmp_path: Pat
         answers = [click_and_hear(page, box["x"] + u * box["width"], box["y"] + v * box["height"]) for u, v in asked]
         assert sum(answer["ok"] for _, answer in answers) >= len(asked) - 2 > 0, answers
         name = next(answer["values"]["point"] for _, answer in answers if answer["ok"])
-        page.wait_for_selector(f'[data-point-id="{name}"]', timeout=10_000)
+        page.wait_for_selector(f'rp-work [data-cut="{name}"]', timeout=10_000, state="attached")

@@ -25,6 +25,7 @@ from PIL import Image
 from playwright.sync_api import Locator, Page, expect
 
 from tests.support.operator_page import operator_page
+from tests.support.page_parts import open_screen
 from tests.support.processes.live_robot import LiveRobot
 from tests.web.test_page_preview_live import asked
 
@@ -110,6 +111,7 @@ def decide(page: Page, robot: LiveRobot) -> None:
     if robot.mode() == "IDLE":
         page.click("#arm")
     expect(page.locator("#mode")).to_have_attribute("data-mode", "READY", timeout=LONG_MS)
+    open_screen(page, "review")
     name = str(rows(page, "PROPOSED").first.get_attribute("data-point-id"))
     row(page, name).locator("button.reject").click()
     page.get_by_role("button", name="wrong cane").click()
@@ -250,14 +252,17 @@ def look(page: Page) -> None:
 
     picture = page.locator("rp-camera img")
     assert picture.evaluate("each => each.naturalWidth") > 0
+    page.click("#swap")
     page.click("#freeze")
     expect(page.locator("rp-camera")).to_contain_text("frozen")
     page.click("#freeze")
     expect(page.locator("rp-camera")).not_to_contain_text("frozen")
+    page.click("#swap")
 
 
 def drive_and_turn_joints(page: Page, robot: LiveRobot) -> None:
     """The base by keys and by the pad, a joint by its button; each only while held. The approval is gone after that."""
+    open_screen(page, "drive")
     page.wait_for_selector('#teleop[aria-disabled="false"]', timeout=LONG_MS)
     page.click("#teleop")
     page.get_by_role("group", name="What moves").get_by_role("button", name="Base").click()
@@ -283,6 +288,7 @@ def drive_and_turn_joints(page: Page, robot: LiveRobot) -> None:
     )
     robot.wait(lambda: robot.mode() == "READY", 10, "the hold to end")
     page.click("#teleop")
+    page.click("#more")
     page.click("#home")
     robot.wait(
         lambda: robot.mode() == "READY" and abs(robot.state()["joints"]["position"][8] - joint) < 0.02, 60, "home"
@@ -291,7 +297,7 @@ def drive_and_turn_joints(page: Page, robot: LiveRobot) -> None:
 
 def charts_and_log(page: Page) -> None:
     """Five minutes of every reading with the value under the pointer, held still; the log by words."""
-    page.get_by_role("button", name="Charts").click()
+    open_screen(page, "engineer")
     chart = page.locator("rp-charts figure[data-chart] canvas").first
     expect(chart).to_be_visible()
     chart.hover()
@@ -299,7 +305,6 @@ def charts_and_log(page: Page) -> None:
     page.click("#pause-charts")
     expect(page.locator("#pause-charts")).to_have_attribute("aria-pressed", "true")
     page.click("#pause-charts")
-    page.click("#close-drawer")
     lines = page.locator("rp-log li:visible")
     page.fill("#log-words", "rejected")
     expect(lines.first).to_contain_text("reject", ignore_case=True, timeout=LONG_MS)
@@ -310,6 +315,7 @@ def charts_and_log(page: Page) -> None:
 
 def people(page: Page, robot: LiveRobot) -> None:
     """Somebody is invited, asks for control, is given it, and has it taken back by a second press."""
+    page.click("#person")
     page.click("#invite")
     page.fill("#invite-user", "bob")
     page.select_option("#invite-role", "operator")
@@ -343,7 +349,7 @@ def people(page: Page, robot: LiveRobot) -> None:
 
 def report(page: Page) -> None:
     """On the page, and saved as CSV and as JSON."""
-    page.get_by_role("button", name="Report").click()
+    open_screen(page, "report")
     expect(page.locator("rp-report .hint").first).to_contain_text("From the ledger", timeout=LONG_MS)
     expect(page.locator("rp-report")).to_contain_text("gave control to the person who had asked", timeout=LONG_MS)
     for words, name in (("CSV", "cuts.csv"), ("JSON", "report.json")):
@@ -352,7 +358,6 @@ def report(page: Page) -> None:
         assert saved.value.suggested_filename == name
         text = Path(saved.value.path()).read_text(encoding="utf-8")
         assert "point" in text.splitlines()[0] if name == "cuts.csv" else json.loads(text)["control"]
-    page.click("#close-drawer")
 
 
 def stop_and_reset(page: Page, robot: LiveRobot) -> None:

@@ -10,7 +10,7 @@ import pytest
 from playwright.sync_api import Page
 
 from bridge.sim.robot import trace
-from tests.support.operator_page import operator_page
+from tests.support.operator_page import accept, operator_page
 from tests.support.processes.live_robot import LiveRobot
 
 pytestmark = [pytest.mark.browser, pytest.mark.alone]
@@ -18,14 +18,14 @@ pytestmark = [pytest.mark.browser, pytest.mark.alone]
 
 def arm_and_accept(page: Page, *places: int) -> list[str]:
     """Wait for detections, arm, accept those at these places of the queue on the page; their ids."""
-    page.wait_for_selector('[data-point-id][data-state="PROPOSED"]', timeout=90_000)
+    page.wait_for_selector('[data-cut][data-state="PROPOSED"]', timeout=90_000)
     page.click("#arm")
     page.wait_for_selector('#mode[data-mode="READY"]', timeout=15_000)
-    rows = page.locator('[data-point-id][data-state="PROPOSED"]').all()
-    chosen = [str(rows[place].get_attribute("data-point-id")) for place in places]
+    rows = page.locator('[data-cut][data-state="PROPOSED"]').all()
+    chosen = [str(rows[place].get_attribute("data-cut")) for place in places]
     for point_id in chosen:
-        page.locator(f'[data-point-id="{point_id}"] button.accept').click()
-        page.wait_for_selector(f'[data-point-id="{point_id}"][data-state="ACCEPTED"]', timeout=40_000)
+        accept(page, point_id)
+        page.wait_for_selector(f'[data-cut="{point_id}"][data-state="ACCEPTED"]', timeout=40_000)
     return chosen
 
 
@@ -125,7 +125,7 @@ def test_accepted_points_are_cut_where_they_were_accepted_and_the_page_stops_the
             entries = {row["entry"]["point_id"]: row["entry"] for row in robot.points()}
             done = [point_id for point_id in chosen if entries[point_id]["state"] == "DONE"]
             for point_id in done:
-                page.wait_for_selector(f'[data-point-id="{point_id}"][data-state="DONE"]', timeout=40_000)
+                page.wait_for_selector(f'[data-cut="{point_id}"][data-state="DONE"]', timeout=40_000)
             assert robot.refused() == []
     assert sorted(took)[(len(took) - 1) // 2] < 0.5, took
     assert max(took) < 1.0, took

@@ -12,7 +12,7 @@ import pytest
 from playwright.sync_api import expect
 
 from bridge.sim.robot import trace
-from tests.support.operator_page import operator_page
+from tests.support.operator_page import accept, operator_page
 from tests.support.processes.demo import TracedDemo, running_demo
 
 # Slow: two whole simulations and a browser that draws in software, on two cores.
@@ -74,7 +74,7 @@ def test_one_works_the_other_stands_and_one_stop_stops_both(tmp_path: Path, chro
                 f"{origin}/api/invite", data={"user": "eve", "role": "viewer"}, headers={"Origin": origin}
             )
             script = closing.enter_context(Script(origin, invited.json()["link"].split("token=")[1]))
-            page.wait_for_selector('[data-point-id][data-state="PROPOSED"]', timeout=90_000)
+            page.wait_for_selector('[data-cut][data-state="PROPOSED"]', timeout=90_000)
             page.click("#arm")
             page.wait_for_selector('#mode[data-mode="READY"]', timeout=15_000)
             script.wait(lambda: script.points("panda-2"), 60, "points of the second robot")
@@ -85,7 +85,8 @@ def test_one_works_the_other_stands_and_one_stop_stops_both(tmp_path: Path, chro
                 if "DONE" in states or script.modes()[0] == "AUTO":
                     return "DONE" in states
                 if "ACCEPTED" not in states:
-                    page.locator('[data-state="PROPOSED"] button.accept').first.click()
+                    first = page.locator('[data-cut][data-state="PROPOSED"]').first
+                    accept(page, str(first.get_attribute("data-cut")))
                 elif page.get_attribute("#start", "aria-disabled") == "false":
                     page.click("#start")
                 page.wait_for_timeout(500)
@@ -100,8 +101,8 @@ def test_one_works_the_other_stands_and_one_stop_stops_both(tmp_path: Path, chro
             chosen.click()
             expect(chosen).to_have_attribute("aria-current", "page")
             page.wait_for_selector('#mode[data-mode="IDLE"]', timeout=20_000)
-            page.wait_for_selector('[data-point-id][data-state="PROPOSED"]', timeout=30_000)
-            expect(page.locator('[data-state="DONE"]')).to_have_count(0)
+            page.wait_for_selector('[data-cut][data-state="PROPOSED"]', timeout=30_000)
+            expect(page.locator('[data-cut][data-state="DONE"]')).to_have_count(0)
             expect(page.locator("rp-scene iframe")).to_have_class("loaded", timeout=30_000)
             view = page.frame(url=re.compile(r"/robots/panda-2/viser/"))
             assert view is not None

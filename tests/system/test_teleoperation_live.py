@@ -73,6 +73,7 @@ def test_the_tool_follows_the_dragged_gizmo_and_rests_when_it_is_let_go(tmp_path
     with LiveRobot(tmp_path) as robot:
         with operator_page(chromium_path, robot.link("ada")) as page:
             ready(robot)
+            page.click('[data-tab="drive"]')
             page.wait_for_selector('#teleop[aria-disabled="false"]', timeout=60_000)
             page.click("#teleop")
             page.wait_for_timeout(2_000)

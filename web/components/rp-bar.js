@@ -7,6 +7,7 @@ import { closePreview, hasPreview, openPreview, previewOpen, whyNoPreview } from
 import { timeLeft } from "../js/control/progress.js";
 import { durationWords } from "../js/state/format.js";
 import { link, now, pageState, points, preview, say } from "../js/state/page-state.js";
+import { reasonText } from "../js/state/reasons.js";
 import { screen } from "../js/state/screens.js";
 import { drawOn } from "../js/state/signals.js";
 import { counted, text } from "../js/state/texts.js";
@@ -57,7 +58,9 @@ class RpBar extends HTMLElement {
     drawOn([pageState, points, preview, previewOpen, screen, link, now], () => {
       this.draw();
       const step = nextStep();
-      setText(why, step && whyNotStep(step) ? (this.steps.get(step)?.button.title ?? "") : "");
+      const refused = step && whyNotStep(step);
+      setText(why, reasonText(refused || pageState.get()?.controller?.reason));
+      why.title = why.textContent ?? "";
       show.hidden = whyNoPreview() !== null && !hasPreview();
       show.setAttribute("aria-expanded", String(previewOpen.get()));
       const count = waitingForPerson();
