@@ -7,7 +7,7 @@ from rolling_panda import reasons
 from rolling_panda.messages import page as p
 from rolling_panda.reasons import text_of
 from tests.support.axe import axe, grave
-from tests.support.page_parts import leave
+from tests.support.page_parts import leave, open_screen
 from tests.support.page_states import STATES
 from tests.support.played_page import box_of
 from tests.support.played_server import ORIGIN, PlayedServer
@@ -113,18 +113,19 @@ def test_a_fingertip_hits_everything_that_can_be_pressed(browser: Browser, serve
     server.attach(page)
     page.goto(f"{ORIGIN}/")
     expect(page.locator("#mode")).to_have_attribute("data-mode", "READY")
-    page.locator('[data-point-id="p1"]').click()
-    page.locator("rp-rule summary").click()
-    for width, height in ((1024, 768), (820, 1180)):
-        page.set_viewport_size({"width": width, "height": height})
-        pressed = page.locator("button:visible, select:visible, summary:visible, input:visible, a:visible")
-        assert pressed.evaluate_all(SMALL) == []
-        overflow = page.evaluate("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]")
-        assert overflow[0] <= width and overflow[1] <= height
+    for name in ("review", "drive", "report", "engineer", "work"):
+        open_screen(page, name)
+        for width, height in ((1024, 768), (820, 1180)):
+            page.set_viewport_size({"width": width, "height": height})
+            pressed = page.locator("button:visible, select:visible, summary:visible, input:visible, a:visible")
+            assert pressed.evaluate_all(SMALL) == [], name
+            overflow = page.evaluate("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]")
+            assert overflow[0] <= width and overflow[1] <= height
     context.close()
 
 
 def test_the_log_is_searched_by_severity_process_and_words(page: Page, server: PlayedServer) -> None:
+    open_screen(page, "engineer")
     armed = reasons.said("READY")
     lines = [("bridge", "error", reasons.robot_cutter_jammed()), ("controller", "info", armed)]
     lines.append(("controller", "warning", reasons.said("p7 is refused: too near a wire")))

@@ -118,6 +118,7 @@ def test_each_alarm_comes_with_its_state_and_goes(page: Page, server: PlayedServ
                 setattr(server, name, changes.get(name, getattr(usual, name)))
             server.tell(server.page_points())
             row = page.locator("#alarms li:not(.gone)")
+            expect(row.and_(page.locator(f'[data-code="{code}"]'))).to_be_attached()
             if (more := page.locator('#more-alarms[aria-expanded="false"]')).is_visible():
                 more.click()
             expect(row.and_(page.locator(f'[data-code="{code}"]'))).to_be_visible()
