@@ -30,7 +30,10 @@ class RpWork extends HTMLElement {
     const empty = element("p", { class: "empty", text: text("work.none") });
     this.rest.append(this.list, empty);
     this.append(stale, theCut(), needs(), this.rest);
-    drawOn([pageState, link, now], () => setText(stale, staleWords("controller", "perception")));
+    drawOn([pageState, link, now], () => {
+      const words = staleWords("controller", "perception");
+      setText(stale, words);
+    });
     const groups = keepRows(this.list, vineGroup);
     drawOn([points, selected, pageState], () => {
       empty.hidden = cuts().length > 0;
