@@ -103,8 +103,8 @@ FAMILIES: dict[str, Sequence[str]] = {
     "teleop.${}.${}.hint": CHOICES,
     "screen.${}": ("work", "review", "drive", "report", "engineer"),
     "health.${}": ("robot", "camera"),
-    "bar.${}": ("preview", "reset"),
-    "bar.to_${}": ("review", "preview", "reset"),
+    "bar.${}": ("preview", "approve", "reset"),
+    "bar.to_${}": ("review", "preview"),
     "keys.${}": ("stop", "decide", "undo", "camera", "measure", "hold", "drive", "close", "help"),
     "hint.${}": ("next", "screens", "stop", "person"),
     # What a message names.
