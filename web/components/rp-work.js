@@ -61,7 +61,7 @@ function theCut() {
   const picture = element("img", { class: "work-picture", attributes: { alt: text("work.picture") } });
   const why = element("p", { class: "hint" });
   const open = element("a", { class: "button", text: text("work.open"), attributes: { href: "#review" } });
-  const box = element("section", { class: "work-cut" }, count, name, state, picture, why, open);
+  const box = element("section", { class: "work-cut" }, count, name, open, state, picture, why);
   let of = "";
   // Asked for again where it is not there yet.
   picture.addEventListener("error", () => {
