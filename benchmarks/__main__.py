@@ -12,6 +12,7 @@ from rolling_panda.errors import RollingPandaError
 BENCHMARKS = {
     "tick": ("benchmarks.control.tick", "time of one control step"),
     "row": ("benchmarks.control.row", "cuts in simulated rows, end to end"),
+    "world": ("benchmarks.control.world", "the same in a rough world: calibration, ground, wind, light, blades"),
     "reach": ("benchmarks.control.reach", "tool poses anywhere around the robot: reached, limits, manipulability"),
     "arm": ("benchmarks.control.arm", "the arm alone between random poses, beside published figures"),
     "page": ("benchmarks.page.latency", "the page in a real browser: hand to robot, robot to screen, with viewers"),

@@ -14,6 +14,7 @@ from bridge.loop import bridge_runner
 from bridge.real.config import RealConfig
 from bridge.sim.camera.config import CameraConfig
 from bridge.sim.vineyard.config import VineyardConfig
+from bridge.sim.world.config import load_world
 from rolling_panda.config import RobotConfig, load_section
 from rolling_panda.errors import RollingPandaError
 from rolling_panda.reasons import text_of
@@ -86,6 +87,7 @@ def _check(arguments: argparse.Namespace) -> None:
     else:
         load_section(arguments.config, "vineyard", VineyardConfig)
         load_section(arguments.config, "camera", CameraConfig)
+        load_world(arguments.config)
 
 
 def _run(context: ProcessContext) -> None:

@@ -15,7 +15,7 @@ from msgspec import Meta, Struct
 from rolling_panda.bounds import at_most, check, within
 from rolling_panda.errors import ConfigError
 
-SECTIONS = ("transport", "robot", "bridge", "vineyard", "camera", "controller", "perception", "server", "real")
+SECTIONS = ("transport", "robot", "bridge", "vineyard", "camera", "world", "controller", "perception", "server", "real")
 Positive = Annotated[float, Meta(gt=0.0, le=1e6)]
 Section = TypeVar("Section", bound=Struct)
 
@@ -127,6 +127,11 @@ def load_section(path: Path, name: str, kind: type[Section]) -> Section:
         return msgspec.convert(table, kind)
     except msgspec.ValidationError as error:
         raise ConfigError(f"{path}: [{name}]: {error}") from error
+
+
+def section_keys(path: Path, name: str) -> tuple[str, ...]:
+    """The keys that a configuration file gives of a section, which `load_section` has checked."""
+    return tuple(_read(path).get(name, {}))
 
 
 def _read(path: Path) -> dict[str, Any]:

@@ -2919,6 +2919,11 @@ def no_cut_yet() -> None:
     """Nothing has been cut yet."""
 
 
+@_reason("warning", "")
+def blades_jammed() -> None:
+    """The blades jammed in the wood, and opened again."""
+
+
 @_reason("info", "")
 def blades_met() -> None:
     """The blades met."""

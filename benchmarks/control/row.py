@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from msgspec.structs import asdict as asdict_of
 from msgspec.structs import replace
 
 from benchmarks.common.documents import bench_parser, write
@@ -25,6 +26,7 @@ from bridge.sim.robot import trace
 from bridge.sim.robot.robot import SimulatedRobot
 from bridge.sim.vineyard.row import Row
 from bridge.sim.vineyard.truth import judge, staying_rods
+from bridge.sim.world.config import CALM, WorldConfig
 from controller.config import ControllerConfig
 from controller.motion.follower import Tracking
 from controller.whole_body.registry import METHODS
@@ -54,6 +56,7 @@ def cut_row(
     plans: bool = True,
     looks: bool = True,
     segmenter: str = "",
+    world: WorldConfig = CALM,
 ) -> RowRun:
     """Survey from the start posture, accept up to `points` of what was detected, work through them.
 
@@ -69,6 +72,7 @@ def cut_row(
         plans: False works without the session's plan.
         looks: False cuts without the closer looks before and after.
         segmenter: In place of the configured one.
+        world: Disturbances. Where `odom` drifts, `distance`, `tool_error` and `path_rms` are no truth.
     """
     errors: list[float] = []
     clock = StageClock(load_section(resource("assets/config/sim.toml"), "controller", ControllerConfig))
@@ -83,7 +87,7 @@ def cut_row(
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "trace"
-        config = _config(Path(folder) / "row.toml", pictures)
+        config = _config(Path(folder) / "row.toml", pictures, world)
         with ClosedLoop(seed, path, config, method, watch, plans, looks, segmenter) as loop:
             touches, truths = CaneTouches(staying_rods(_row(loop))), judge(_row(loop))
             accepted = [] if along else _accept(loop, points)
@@ -125,6 +129,9 @@ def cut_row(
                 duration_s=durations.get(entry.point_id, 0.0),
                 true_right=truth.right,
                 harm=truth.harm,
+                right_cane=truth.right_cane,
+                nodes_left=truth.nodes_left,
+                past_best=truth.past_best,
             )
         )
     return RowRun(
@@ -150,11 +157,13 @@ def _row(loop: ClosedLoop) -> Row:
     return robot.row
 
 
-def _config(path: Path, pictures: float) -> Path:
-    """The simulation's configuration with another rate of pictures."""
+def _config(path: Path, pictures: float, world: WorldConfig) -> Path:
+    """The simulation's configuration with another rate of pictures and disturbances."""
     text = resource("assets/config/sim.toml").read_text(encoding="utf-8")
     usual = re.compile(r"^camera_moving_hz = .*$", re.MULTILINE)
-    path.write_text(usual.sub(f"camera_moving_hz = {pictures}", text, count=1), encoding="utf-8")
+    text = usual.sub(f"camera_moving_hz = {pictures}", text, count=1)
+    knobs = "\n".join(f"{key} = {value!r}" for key, value in asdict_of(world).items() if key != "preset")
+    path.write_text(text.replace('preset = "calm"', f'preset = "{world.preset}"\n{knobs}', 1), encoding="utf-8")
     return path
 
 

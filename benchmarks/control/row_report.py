@@ -27,6 +27,9 @@ class Cut:
         duration_s: Since the cut before it, or since the start (s, simulated).
         true_right: Wood was severed where it is right by the simulator's truth, and nothing that stays.
         harm: What that stays was severed; empty for nothing.
+        right_cane: Wood that is to be cut was cut.
+        nodes_left: Count nodes left on the cane that stays, where it was cut.
+        past_best: Along the wood, from where the rule puts the blades to where they cut (m).
     """
 
     method: str
@@ -39,6 +42,9 @@ class Cut:
     duration_s: float
     true_right: bool
     harm: str
+    right_cane: bool = False
+    nodes_left: int | None = None
+    past_best: float | None = None
 
     @property
     def right(self) -> bool:

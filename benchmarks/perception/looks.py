@@ -118,9 +118,10 @@ def look_again(points: Sequence[m.PruningPoint], row: Row, eye: CloseCamera, opi
         at = poses.cut.homogeneous.copy()
         at[:3, 3] = seen.position
         cut = close_blades(row, at, BridgeConfig())
-        afterwards = eye.look(cut.row, T_odom_camera, point)
+        after = cut.applied(row)
+        afterwards = eye.look(after, T_odom_camera, point)
         if afterwards.finding != "severed":
-            afterwards = eye.look(cut.row, T_odom_camera, point)
+            afterwards = eye.look(after, T_odom_camera, point)
         into.afterwards.append((afterwards.finding, bool(cut.severed)))
 
 

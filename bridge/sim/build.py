@@ -14,6 +14,7 @@ from bridge.sim.robot.robot import SimulatedRobot
 from bridge.sim.robot.trace import TraceWriter
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
+from bridge.sim.world.config import load_world
 from rolling_panda.bounds import wider
 from rolling_panda.config import RobotConfig, load_section
 from rolling_panda.model.robot import RobotModel
@@ -33,8 +34,8 @@ def simulated_bridge(
     """Bridge core with the simulated robot beside a row grown from `seed`.
 
     Args:
-        config_path: TOML file with the sections robot, bridge, vineyard and camera.
-        seed: Of row and camera.
+        config_path: TOML file with the sections robot, bridge, vineyard, camera and world.
+        seed: Of row, camera and disturbances.
         trace: File for a trace of every physics step.
         camera: `inline` renders within a step, for reproducible messages; `process` renders in a process, for real
             time.
@@ -67,16 +68,17 @@ def simulated_robot(
     config = load_section(config_path, "bridge", BridgeConfig)
     row = grow(load_section(config_path, "vineyard", VineyardConfig), seed)
     lens = load_section(config_path, "camera", CameraConfig)
+    world = load_world(config_path)
     writer = None if trace is None else TraceWriter(trace)
     renderer: CameraRenderer
     if camera == "inline":
         # Imported here for the same reason as in the process.
         from bridge.sim.camera.renderer import InlineRenderer
 
-        renderer = InlineRenderer(lens, seed)
+        renderer = InlineRenderer(lens, seed, world)
     else:
-        renderer = RenderProcess(lens, seed, "interface" if camera == "device" else "background")
-    return SimulatedRobot(config, row, renderer, writer)
+        renderer = RenderProcess(lens, seed, "interface" if camera == "device" else "background", world)
+    return SimulatedRobot(config, row, renderer, writer, world, seed)
 
 
 def press_button(core: BridgeCore, pressed: bool) -> None:

@@ -10,6 +10,7 @@ from typing import Protocol
 from bridge.core.picture import Picture
 from bridge.sim.camera.config import CameraConfig
 from bridge.sim.vineyard.row import Row
+from bridge.sim.world.config import CALM, WorldConfig
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.runtime.scheduling import Priority, set_priority
 
@@ -17,8 +18,8 @@ from rolling_panda.runtime.scheduling import Priority, set_priority
 class CameraRenderer(Protocol):
     """Renders exposures."""
 
-    def expose(self, row: Row, T_world_camera: Array) -> bool:
-        """Start an exposure of the present row; False while the last one is not ready."""
+    def expose(self, row: Row, T_world_camera: Array, at: float) -> bool:
+        """Start an exposure of the present row at a simulated time (s); False while the last one is not ready."""
 
     def ready(self) -> Picture | None:
         """The finished picture, once; None without one."""
@@ -33,30 +34,33 @@ class RenderProcess:
     A thread waits for that process. A process that dies is started again.
     """
 
-    def __init__(self, config: CameraConfig, seed: int, priority: Priority = "background") -> None:
+    def __init__(
+        self, config: CameraConfig, seed: int, priority: Priority = "background", world: WorldConfig = CALM
+    ) -> None:
         """Start the process. It ends when the pipe closes.
 
         Args:
             config: Lens and errors.
             seed: Of the noise.
             priority: Of the process.
+            world: Disturbances.
         """
-        self._config, self._seed, self._priority = config, seed, priority
+        self._config, self._seed, self._priority, self._world = config, seed, priority, world
         self._known: Row | None = None
         self._process, self._pipe = self._start()
         self._closing = False
-        self._requests: queue.SimpleQueue[tuple[Row, Array] | None] = queue.SimpleQueue()
+        self._requests: queue.SimpleQueue[tuple[Row, Array, float] | None] = queue.SimpleQueue()
         self._picture: Picture | None = None
         self._busy = False
         self._thread = threading.Thread(target=self._wait_for_pictures, name="camera-pipe", daemon=True)
         self._thread.start()
 
-    def expose(self, row: Row, T_world_camera: Array) -> bool:
+    def expose(self, row: Row, T_world_camera: Array, at: float) -> bool:
         """Request a picture; the row is sent only when it has changed."""
         if self._busy:
             return False
         self._busy = True
-        self._requests.put((row, T_world_camera))
+        self._requests.put((row, T_world_camera, at))
         return True
 
     def ready(self) -> Picture | None:
@@ -80,7 +84,7 @@ class RenderProcess:
         ours, theirs = context.Pipe()
         process = context.Process(
             target=_render_until_closed,
-            args=(theirs, self._config, self._seed, self._priority),
+            args=(theirs, self._config, self._seed, self._priority, self._world),
             name="camera-renderer",
             daemon=True,
         )
@@ -92,10 +96,10 @@ class RenderProcess:
         while (request := self._requests.get()) is not None:
             self._picture = self._render(*request)
 
-    def _render(self, row: Row, T_world_camera: Array) -> Picture | None:
+    def _render(self, row: Row, T_world_camera: Array, at: float) -> Picture | None:
         while not self._closing:
             try:
-                self._pipe.send((None if row is self._known else row, T_world_camera))
+                self._pipe.send((None if row is self._known else row, T_world_camera, at))
                 self._known = row
                 picture: Picture = self._pipe.recv()
                 return picture
@@ -108,17 +112,19 @@ class RenderProcess:
         return None
 
 
-def _render_until_closed(pipe: Connection, config: CameraConfig, seed: int, priority: Priority) -> None:
+def _render_until_closed(
+    pipe: Connection, config: CameraConfig, seed: int, priority: Priority, world: WorldConfig
+) -> None:
     # Imported here, since ray casting and its filters are a lot of memory, which the bridge does without.
     from bridge.sim.camera.renderer import InlineRenderer
 
     set_priority(priority)
-    renderer, row = InlineRenderer(config, seed), Row(())
+    renderer, row = InlineRenderer(config, seed, world), Row(())
     try:
         while True:
-            changed, T_world_camera = pipe.recv()
+            changed, T_world_camera, at = pipe.recv()
             row = row if changed is None else changed
-            renderer.expose(row, T_world_camera)
+            renderer.expose(row, T_world_camera, at)
             pipe.send(renderer.ready())
     except (EOFError, BrokenPipeError, KeyboardInterrupt):
         return

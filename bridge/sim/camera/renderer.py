@@ -10,6 +10,9 @@ from bridge.sim.camera.mesh import Floats, Indices, RodMesh
 from bridge.sim.camera.palette import Bytes, Palette
 from bridge.sim.camera.sensors import color_sensor, depth_sensor, miscalibration
 from bridge.sim.vineyard.row import Array, Row
+from bridge.sim.world.config import CALM, WorldConfig
+from bridge.sim.world.errors import draw_errors
+from bridge.sim.world.wind import Wind
 from rolling_panda.messages.types import WOOD_CLASSES
 
 _GROUND = WOOD_CLASSES.index("ground")
@@ -35,20 +38,24 @@ class RgbdImage:
 class Camera:
     """Renders a row from a camera pose. Caches the mesh of the last row; not thread-safe."""
 
-    def __init__(self, config: CameraConfig | None = None, seed: int = 0) -> None:
+    def __init__(self, config: CameraConfig | None = None, seed: int = 0, world: WorldConfig = CALM) -> None:
         """Prepare the rays.
 
         Args:
             config: Image size, lens and noise.
             seed: Of noise and colours; not negative.
+            world: Disturbances: where the camera is on the tool, its lens, and sun on thin wood.
         """
         self.config = config or CameraConfig()
         self.intrinsics = self.config.intrinsics()
         self._seed = seed
         self._palette = Palette(seed, self.config.appearance)
-        self._turn = miscalibration(self.config.calibration_angle, seed).astype(np.float32)
+        errors = draw_errors(world, seed)
+        self._turn = (errors.hand_eye @ miscalibration(self.config.calibration_angle, seed)).astype(np.float32)
+        self._shift, self._thin_lost = errors.hand_eye_shift, world.depth_lost
         k = self.intrinsics
-        u, v = np.meshgrid((np.arange(k.width) - k.cx) / k.fx, (np.arange(k.height) - k.cy) / k.fy)
+        fx, fy = k.fx * errors.focal, k.fy * errors.focal
+        u, v = np.meshgrid((np.arange(k.width) - k.cx) / fx, (np.arange(k.height) - k.cy) / fy)
         # Rays have length 1 along the optical axis, so that their distances are depths.
         self._rays = np.stack([u, v, np.ones_like(u)], -1).reshape(-1, 3).astype(np.float32)
         self._lengths = np.linalg.norm(self._rays, axis=1)
@@ -65,7 +72,7 @@ class Camera:
         """
         if row is not self._row:
             self._mesh, self._row = RodMesh(row), row
-        origin = T_world_camera[:3, 3].astype(np.float32)
+        origin = (T_world_camera[:3, 3] + T_world_camera[:3, :3] @ self._shift).astype(np.float32)
         rays: Floats = self._rays @ (T_world_camera[:3, :3].astype(np.float32) @ self._turn).T
         hits = self._mesh.first_hits(np.broadcast_to(origin, rays.shape).copy(), rays)
         depth = hits.distance
@@ -91,7 +98,14 @@ class Camera:
         pixel_width[on_rod] = self._mesh.width[rods] * np.float32(self.intrinsics.fx) / depth[on_rod]
         return RgbdImage(
             color_sensor(self.config, color.reshape(*shape, 3), rng.spawn(1)[0]),
-            depth_sensor(self.config, self.intrinsics.fx, depth.reshape(shape), pixel_width.reshape(shape), rng),
+            depth_sensor(
+                self.config,
+                self.intrinsics.fx,
+                depth.reshape(shape),
+                pixel_width.reshape(shape),
+                rng,
+                self._thin_lost,
+            ),
             labels.reshape(shape),
             np.where(own, hits.rod, np.int32(-1)).reshape(shape),
         )
@@ -112,14 +126,20 @@ class Camera:
 class InlineRenderer:
     """Renders inside `expose`, so that the same calls give the same pictures."""
 
-    def __init__(self, config: CameraConfig, seed: int) -> None:
+    def __init__(self, config: CameraConfig, seed: int, world: WorldConfig = CALM) -> None:
         """Prepare the camera."""
-        self._camera = Camera(config, seed)
+        self._camera = Camera(config, seed, world)
+        self._sway, self._seed = world.sway, seed
+        self._wind: Wind | None = None
         self._frame = 0
         self._picture: Picture | None = None
 
-    def expose(self, row: Row, T_world_camera: Array) -> bool:
+    def expose(self, row: Row, T_world_camera: Array, at: float) -> bool:
         """Render and encode now."""
+        if self._sway > 0.0:
+            # The first row that is seen is not cut yet.
+            self._wind = self._wind or Wind(row, self._sway, self._seed)
+            row = self._wind.blown(row, at)
         image = self._camera.render(row, T_world_camera, self._frame)
         self._frame += 1
         self._picture = encode_picture(self._camera.intrinsics, image.color, image.depth, image.labels)

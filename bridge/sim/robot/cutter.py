@@ -1,6 +1,6 @@
 """The simulated secateurs."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,21 +19,38 @@ _IGNORED = frozenset({"background", "ground"})
 
 @dataclass(frozen=True)
 class SeveredRod:
-    """A severed rod: its index, the rod before the cut, and the position of the cut (3, m, world)."""
+    """A severed rod: its index, the rod before the cut, and the place of the cut.
+
+    `along` is the fraction of the rod's length, and `point` the position there (3, m, world).
+    """
 
     index: int
     rod: Rod
+    along: float
     point: Array
 
 
 @dataclass(frozen=True)
 class CutResult:
-    """Result of closing the blades: the new row, the severed rods, and what was severed or why nothing."""
+    """Result of closing the blades: the severed rods, root first, and what was severed or why nothing."""
 
-    row: Row
     severed: tuple[SeveredRod, ...]
     jammed: bool
     detail: Reason
+
+    def at_rest(self, row: Row) -> "CutResult":
+        """The same cut on the same rods of a row that no wind moves."""
+        rods = ((item, row.rods[item.index]) for item in self.severed)
+        severed = (SeveredRod(i.index, rod, i.along, rod.at(i.along)[0]) for i, rod in rods if rod is not None)
+        return replace(self, severed=tuple(severed))
+
+    def applied(self, row: Row, hangs: Array | None = None) -> Row:
+        """A row with the same rods after the cut; arguments as of `Row.sever`."""
+        for item in self.severed:
+            # An earlier cut may have removed the rod.
+            if row.rods[item.index] is not None:
+                row = row.sever(item.index, item.along, hangs)
+        return row
 
 
 class Cutter:
@@ -93,7 +110,7 @@ def close_blades(row: Row, T_world_tool: Array, config: BridgeConfig) -> CutResu
     """
     standing = [(i, rod) for i, rod in row.standing() if rod.kind not in _IGNORED]
     if not standing:
-        return CutResult(row, (), False, reasons.nothing_between_blades())
+        return CutResult((), False, reasons.nothing_between_blades())
     R, p = T_world_tool[:3, :3], T_world_tool[:3, 3]
     starts = (np.array([rod.start for _, rod in standing]) - p) @ R
     ends = (np.array([rod.end for _, rod in standing]) - p) @ R
@@ -108,19 +125,15 @@ def close_blades(row: Row, T_world_tool: Array, config: BridgeConfig) -> CutResu
         index, rod = standing[k]
         local = rod.at(float(fraction[k]))[1] if crosses[k] else 0.0
         if rod.kind not in _SOFT and touched[k]:
-            return CutResult(row, (), True, reasons.blades_on_hard_part(rod.kind))
+            return CutResult((), True, reasons.blades_on_hard_part(rod.kind))
         if 2 * local > config.largest_diameter:
-            return CutResult(row, (), True, reasons.wood_beyond_blades(rod.kind, 2000 * local))
+            return CutResult((), True, reasons.wood_beyond_blades(rod.kind, 2000 * local))
         if crosses[k]:
             cuts.append((index, rod, float(fraction[k])))
     if not cuts:
-        return CutResult(row, (), False, reasons.nothing_between_blades())
-    severed = tuple(SeveredRod(index, rod, rod.at(along)[0]) for index, rod, along in cuts)
-    for index, _, along in cuts:
-        # An earlier cut may have removed the rod.
-        if row.rods[index] is not None:
-            row = row.sever(index, along)
-    return CutResult(row, severed, False, reasons.wood_severed(", ".join(item.rod.kind for item in severed)))
+        return CutResult((), False, reasons.nothing_between_blades())
+    severed = tuple(SeveredRod(index, rod, along, rod.at(along)[0]) for index, rod, along in cuts)
+    return CutResult(severed, False, reasons.wood_severed(", ".join(item.rod.kind for item in severed)))
 
 
 def _plane_crossing(starts: Array, ends: Array) -> Array:

@@ -1,8 +1,8 @@
 """MuJoCo model of the robot and the solid parts of the row, from the same parameters as the Pinocchio model.
 
 Physics assumptions:
-- Flat, hard floor. Each driven wheel has one contact point below its centre (a sphere of the rolling radius), so that
-  the track is exact and turning does not scrub.
+- Hard floor. Each driven wheel has one contact point below its centre (a sphere of the rolling radius), so that the
+  track is exact and turning does not scrub. Uneven ground is a plane under each wheel, which follows the ground there.
 - The caster's fork and wheel are bodies of their own.
 - The base has a free joint; only friction holds it.
 - Posts, trunks, cordons and wires are rigid. Canes and spurs are visible and can be cut, but do not collide.
@@ -19,6 +19,7 @@ import numpy as np
 import pinocchio as pin
 
 from bridge.sim.vineyard.row import Row
+from bridge.sim.world.errors import Errors
 from rolling_panda.errors import ModelError
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import assemble, panda_urdf
@@ -27,8 +28,11 @@ from rolling_panda.resources import panda_description, resource
 STEP_S = 0.001
 WHEELS = ("wheel_left", "wheel_right")
 ARM = tuple(f"panda_joint{i}" for i in range(1, 8))
+_TYRES = ("wheel_left_tyre", "wheel_right_tyre", "caster_wheel_tyre")
 SOLID = frozenset({"post", "trunk", "cordon", "wire", "hose"})
 _ROLLS, _HITS_ROW, _HITS_BASE, _HITS_ARM = 1, 2, 4, 8
+# First of the bits of the planes under the wheels.
+_OWN_GROUND = 16
 # Estimates; the masses of the caster are not published.
 _FORK_MASS, _CASTER_MASS = 0.6, 0.8
 _CASTER_RADIUS, _CASTER_TRAIL = 0.080, 0.060
@@ -37,7 +41,7 @@ _WHEEL_ROTOR = 0.1
 # Stiff: a loaded wheel penetrates the floor by less than 1 µm.
 _FLOOR_SOLREF = (0.002, 1.0)
 _FLOOR_SOLIMP = (0.99, 0.999, 0.0001, 0.5, 2.0)
-_RUBBER = 0.9
+_RUBBER, _GRAVITY = 0.9, 9.81
 
 
 @dataclass(frozen=True)
@@ -55,6 +59,7 @@ class Plant:
         camera: Site of the camera's optical frame.
         solid: Whether a geom is a post, trunk, cordon or wire (ngeom).
         rolling: Whether a geom is a tyre or the floor (ngeom).
+        ground: Planes under the wheels on uneven ground, each with the body of its wheel; empty on a flat floor.
     """
 
     model: Any
@@ -67,26 +72,41 @@ class Plant:
     camera: int
     solid: Any
     rolling: Any
+    ground: tuple[tuple[int, int], ...] = ()
 
 
-def build_plant(row: Row) -> Plant:
+def build_plant(row: Row, errors: Errors | None = None, uneven: bool = False) -> Plant:
     """Compile the robot at odom's origin beside the solid rods of `row`.
+
+    Args:
+        row: The row.
+        errors: How this robot differs from the program's model of it; None for not at all.
+        uneven: The ground has a plane of its own under each wheel, which `Plant.ground` names.
 
     Raises:
         ModelError: MuJoCo refuses the model.
     """
     robot = assemble()
+    factors = np.ones(2)
+    if errors is not None:
+        _misplace(robot, errors)
+        factors = errors.wheels
     spec = mujoco.MjSpec()
-    _options(spec)
+    _options(spec, uneven)
+    if errors is not None and errors.slope[0] != 0.0:
+        spec.option.gravity = (-_GRAVITY * np.sin(errors.slope[0]), 0.0, -_GRAVITY * np.cos(errors.slope[0]))
     _add_row(spec, row)
     bodies = {robot.getJointId("base_phi"): _add_base(spec, robot)}
     for name in (*WHEELS, *ARM):
         joint_id = robot.getJointId(name)
         bodies[joint_id] = _add_link(bodies[robot.parents[joint_id]], robot, joint_id)
     base = bodies[robot.getJointId("base_phi")]
-    for name in WHEELS:
-        _add_wheel_contact(bodies[robot.getJointId(name)], robot.jointPlacements[robot.getJointId(name)].translation[2])
+    for name, factor in zip(WHEELS, factors, strict=True):
+        height = robot.jointPlacements[robot.getJointId(name)].translation[2]
+        _add_wheel_contact(bodies[robot.getJointId(name)], height * factor)
     _add_caster(base, _in_joint(robot, "caster_pivot_link"))
+    if uneven:
+        _add_ground(spec)
     for name in (*WHEELS, *ARM):
         spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT).set_to_motor()
     _add_collisions(bodies, robot)
@@ -98,6 +118,29 @@ def build_plant(row: Row) -> Plant:
     except ValueError as error:
         raise ModelError(f"MuJoCo refuses the robot: {error}") from error
     return _plant(model)
+
+
+def _misplace(robot: Any, errors: Errors) -> None:
+    """Move arm and wheels of the assembled model (pinocchio) to where they really are."""
+    shoulder, foot = robot.getJointId(ARM[0]), _in_joint(robot, "panda_link0")
+    if not errors.mount.isIdentity():
+        robot.jointPlacements[shoulder] = foot * errors.mount * foot.inverse() * robot.jointPlacements[shoulder]
+    for name in WHEELS:
+        placed = robot.jointPlacements[robot.getJointId(name)]
+        at = placed.translation * [1.0, errors.track, 1.0]
+        robot.jointPlacements[robot.getJointId(name)] = pin.SE3(placed.rotation, at)
+
+
+def _add_ground(spec: Any) -> None:
+    """A plane for each tyre, that no other one touches."""
+    for number, tyre in enumerate(_TYRES):
+        own = _OWN_GROUND << number
+        spec.geom(tyre).contype = own
+        plane = spec.worldbody.add_geom(name=f"under_{tyre}", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 0.05])
+        plane.contype, plane.conaffinity = 0, own
+        # Neither at the origin nor level: such a plane would not be moved.
+        plane.pos, plane.quat = [0.0, 0.0, -1e-3], [1.0, 1e-3, 0.0, 0.0]
+        _rubber(plane, _RUBBER)
 
 
 def _plant(model: Any) -> Plant:
@@ -117,19 +160,24 @@ def _plant(model: Any) -> Plant:
         int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, "camera")),
         np.array([name.startswith("row_") for name in names]),
         np.array([name == "floor" or name.endswith("_tyre") for name in names]),
+        tuple(
+            (names.index(f"under_{tyre}"), int(model.geom_bodyid[names.index(tyre)]))
+            for tyre in _TYRES
+            if f"under_{tyre}" in names
+        ),
     )
 
 
-def _options(spec: Any) -> None:
+def _options(spec: Any, uneven: bool) -> None:
     spec.option.timestep = STEP_S
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     # Friction much stiffer than the normal direction: otherwise the wheels creep under the servo torque.
     spec.option.impratio = 100.0
     spec.option.iterations = 30
-    spec.option.gravity = (0.0, 0.0, -9.81)
+    spec.option.gravity = (0.0, 0.0, -_GRAVITY)
     floor = spec.worldbody.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 0.05])
-    floor.contype, floor.conaffinity = 0, _ROLLS | _HITS_BASE
+    floor.contype, floor.conaffinity = 0, _HITS_BASE if uneven else _ROLLS | _HITS_BASE
     _rubber(floor, _RUBBER)
 
 

@@ -4,8 +4,8 @@ Physics assumptions in addition to those of `bridge.sim.robot.model`:
 - Wheels and arm are velocity servos with a first-order lag. They are outside MuJoCo's actuators: implicit integration
   of stiff ones changes the wheel speeds after the friction solve, and the base slides by centimetres. Gravity and
   Coriolis torques of the arm are compensated, as on the Panda.
-- Encoders are exact. Odometry errors come from slip and from contact with wood.
-- Severed wood disappears at once.
+- Encoders are exact, unless the world has offsets and slip. Odometry errors come from slip and from contact with wood.
+- Severed wood disappears at once, unless it hangs in the wires. Wind moves canes before the camera and the blades.
 """
 
 import math
@@ -23,6 +23,13 @@ from bridge.sim.robot.cutter import CutResult, Cutter, close_blades
 from bridge.sim.robot.model import STEP_S, build_plant
 from bridge.sim.robot.trace import CUTTER, TraceWriter
 from bridge.sim.vineyard.row import Row
+from bridge.sim.world.config import CALM, WorldConfig
+from bridge.sim.world.errors import draw_errors
+from bridge.sim.world.ground import Ground
+from bridge.sim.world.slip import Slip
+from bridge.sim.world.wind import Wind
+from bridge.sim.world.wood import Wood
+from rolling_panda import reasons
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.wire_values import vector3
@@ -31,25 +38,35 @@ from rolling_panda.reasons import text_of
 _DISPLAYED = frozenset({"post", "trunk", "cordon", "spur", "cane", "node", "wire", "hose", "old cut"})
 _WHEELS_ON_FLOOR = 3
 _SETTLING_STEPS = 200
+#: The ground under the wheels is laid anew when one has moved this far (m): the tangent plane is then off by 1 um.
+_LEVEL_EVERY = 0.001
+#: Only wood that begins this near to the blades can be between them (m).
+_NEAR_BLADES = 0.3
 # Torque of the servos (N·m): URDF of the base, data sheet of the Panda.
 _TORQUE = np.array([60.0, 60.0, 87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0])
 
 
 #: Time constant of the loop that makes a joint follow the lagged setpoint (s): well above a step of 1 ms.
 LOOP_S = 0.010
+#: Time in which a joint that holds takes up a lasting load (s).
+_HOLD_S = 0.05
 
 
 class VelocityServos:
     """First-order lag on the setpoint, then a velocity loop with bounded torque."""
 
-    def __init__(self, lag_s: Array, torque: Array, dt: float) -> None:
+    def __init__(self, lag_s: Array, torque: Array, dt: float, holds: Array | None = None) -> None:
         """At rest.
 
         Args:
             lag_s: Time constant from setpoint to speed (n, s), of which `LOOP_S` is the loop itself.
             torque: Bound (n, N·m), on top of what compensates gravity.
             dt: Step (s).
+            holds: Which joints hold against a lasting load, such as a slope, without a difference in speed (n of 0 and
+                1); None for none.
         """
+        self._hold = np.zeros_like(lag_s) if holds is None else holds * dt / _HOLD_S
+        self._held = np.zeros_like(lag_s)
         self._blend = np.array([1.0 - math.exp(-dt / max(lag - LOOP_S, dt / 10)) for lag in lag_s])
         self._torque = torque
         self._speed = np.zeros_like(lag_s)
@@ -63,7 +80,8 @@ class VelocityServos:
             inertia: Current mass matrix (n×n, kg·m²), which decouples the joints.
         """
         self._speed += self._blend * (setpoint - self._speed)
-        wanted = inertia @ (self._speed - measured) / LOOP_S
+        wanted = inertia @ (self._speed - measured) / LOOP_S + self._held
+        self._held = np.clip(self._held + self._hold * (wanted - self._held), -self._torque, self._torque)
         bounded: Array = np.minimum(np.maximum(wanted, -self._torque), self._torque)
         return bounded
 
@@ -85,6 +103,8 @@ class SimulatedRobot:
         row: Row,
         renderer: CameraRenderer,
         trace: TraceWriter | None = None,
+        world: WorldConfig = CALM,
+        seed: int = 0,
     ) -> None:
         """Start at the origin of odom, at rest in the start posture.
 
@@ -93,6 +113,8 @@ class SimulatedRobot:
             row: The row beside the robot.
             renderer: Renderer of the camera; closed with the robot.
             trace: Records every step; closed with the robot.
+            world: Disturbances.
+            seed: Of the disturbances; not negative.
 
         Raises:
             ModelError: The model does not compile.
@@ -101,10 +123,26 @@ class SimulatedRobot:
         self.row = row
         self._renderer = renderer
         self._trace = trace
-        self._plant = build_plant(row)
+        errors, uneven = draw_errors(world, seed), world.bumps > 0.0 or world.slope_across > 0.0
+        self._offset = errors.joint_offset
+        self._start_arm = np.array(config.start_arm) - self._offset
+        self._plant = build_plant(row, errors, uneven)
+        self._levelled: Array | None = None
+        self._planes, self._wheels = np.array(self._plant.ground, int).reshape(-1, 2).T
+        self._ground = Ground(world, float(errors.slope[1]), seed)
+        radius = float(self._plant.model.geom("wheel_left_tyre").size[0])
+        self._slip = Slip(world.slip, radius, seed) if world.slip > 0.0 else None
+        self._wind = Wind(row, world.sway, seed) if world.sway > 0.0 else None
+        self._wood = Wood(world, seed)
+        self._delay = (world.frame_delay, world.frame_jitter)
+        self._delays = np.random.default_rng([seed, 0xDE1A])
+        self._exposure: float | None = None
         self._data = mujoco.MjData(self._plant.model)
-        self._data.qpos[self._plant.xi_q[2:]] = config.start_arm
+        self._data.qpos[self._plant.xi_q[2:]] = self._start_arm
         mujoco.mj_forward(self._plant.model, self._data)
+        if uneven:
+            # No wheel begins below the ground, into which it would be pressed.
+            self._data.qpos[2] = self._ground.at(self._data.xpos[self._wheels, :2])[0].max()
         self._M = np.zeros((self._plant.model.nv, self._plant.model.nv))
         self._servos = self._make_servos()
         self._settle()
@@ -123,9 +161,13 @@ class SimulatedRobot:
     def read(self) -> Measurement:
         """Encoders and cutter."""
         data, plant, cutter = self._data, self._plant, self._cutter
+        position, velocity = data.qpos[plant.xi_q], data.qvel[plant.xi_v]
+        position[2:] += self._offset
+        if self._slip is not None:
+            position[:2], velocity[:2] = self._slip.encoders, velocity[:2] * self._slip.factor
         return Measurement(
-            data.qpos[plant.xi_q],
-            data.qvel[plant.xi_v],
+            position,
+            velocity,
             cutter.state,
             cutter.cut_id,
             cutter.outcome,
@@ -137,6 +179,8 @@ class SimulatedRobot:
         """One physics step of 1 ms."""
         data = self._data
         self._advance(setpoint.xi)
+        if self._exposure is not None and data.time >= self._exposure:
+            self._expose()
         self.contacts, self.self_contacts = self._contacts() if data.ncon > _WHEELS_ON_FLOOR else (0, 0)
         if self._cutter.step(STEP_S, setpoint.blades):
             self._close_blades(setpoint)
@@ -150,8 +194,16 @@ class SimulatedRobot:
     def capture(self, expose: bool) -> Picture | None:
         """Expose at the true camera pose, and fetch a finished picture."""
         if expose:
-            self._renderer.expose(self.row, self._site(self._plant.camera))
+            delay, jitter = self._delay
+            late = max(0.0, float(self._delays.normal(delay, jitter))) if delay > 0.0 or jitter > 0.0 else 0.0
+            self._exposure = self.time + late
+            if late == 0.0:
+                self._expose()
         return self._renderer.ready()
+
+    def _expose(self) -> None:
+        self._exposure = None
+        self._renderer.expose(self.row, self._site(self._plant.camera), self.time)
 
     def close(self) -> None:
         """Close renderer and trace."""
@@ -188,7 +240,9 @@ class SimulatedRobot:
     def _make_servos(self) -> VelocityServos:
         config = self._config
         lag = np.array([config.wheel_lag_s] * 2 + [config.arm_lag_s] * len(self._plant.arm_v))
-        return VelocityServos(lag, _TORQUE, STEP_S)
+        gravity_leans = self._plant.model.opt.gravity[0] != 0.0
+        holds = np.array([1.0] * 2 + [0.0] * len(self._plant.arm_v)) if self._plant.ground or gravity_leans else None
+        return VelocityServos(lag, _TORQUE, STEP_S, holds)
 
     def _inertia(self) -> Array:
         """Inertia felt by the servos: that of the arm, and half of the robot for each wheel."""
@@ -200,16 +254,36 @@ class SimulatedRobot:
         return inertia
 
     def _advance(self, xi: Array) -> None:
-        data, plant = self._data, self._plant
+        data, plant, slip = self._data, self._plant, self._slip
+        if plant.ground:
+            self._level_ground()
+        if slip is not None:
+            # A wheel that slips turns faster than it rolls.
+            xi = np.concatenate([xi[:2] / slip.factor, xi[2:]])
         data.ctrl[:] = self._servos.step(xi, data.qvel[plant.xi_v], self._inertia())
         # The bias is 1 ms old, as in the Panda's own compensation.
         data.qfrc_applied[plant.arm_v] = data.qfrc_bias[plant.arm_v]
         mujoco.mj_step(plant.model, data)
+        if slip is not None:
+            slip.roll(data.qvel[plant.xi_v[:2]] * STEP_S)
+
+    def _level_ground(self) -> None:
+        """Lay the plane under each wheel on the ground there."""
+        model, planes = self._plant.model, self._planes
+        places = self._data.xpos[self._wheels, :2]
+        if self._levelled is not None and np.abs(places - self._levelled).max() < _LEVEL_EVERY:
+            return
+        self._levelled = places
+        height, normal = self._ground.at(places)
+        model.geom_pos[planes] = np.column_stack([places, height])
+        # The shortest turn from upright to the normal, as a quaternion wxyz.
+        turn = np.column_stack([1.0 + normal[:, 2], -normal[:, 1], normal[:, 0], np.zeros(len(planes))])
+        model.geom_quat[planes] = turn / np.linalg.norm(turn, axis=1, keepdims=True)
 
     def _settle(self) -> None:
         """Let the wheels settle under load, then move to the origin."""
         data, plant = self._data, self._plant
-        for _ in range(_SETTLING_STEPS):
+        for _ in range(_SETTLING_STEPS * (5 if plant.ground else 1)):
             self._advance(np.zeros(len(plant.xi_v)))
         w, i, j, k = data.qpos[3:7]
         half = np.arctan2(2 * (w * k + i * j), 1 - 2 * (j * j + k * k)) / 2
@@ -217,8 +291,10 @@ class SimulatedRobot:
         data.qpos[:2] = 0.0
         data.qvel[:], data.time = 0.0, 0.0
         data.qpos[plant.xi_q[:2]] = 0.0
-        data.qpos[plant.xi_q[2:]] = self._config.start_arm
+        data.qpos[plant.xi_q[2:]] = self._start_arm
         mujoco.mj_forward(plant.model, data)
+        if self._slip is not None:
+            self._slip.encoders = np.zeros(2)
 
     def _site(self, site: int) -> Array:
         T = np.eye(4)
@@ -235,11 +311,25 @@ class SimulatedRobot:
 
     def _close_blades(self, setpoint: Setpoint) -> None:
         tool = self.true_tool()
-        result = close_blades(self.row, tool, self._config)
-        self.row = result.row
-        self._cutter.finish("DONE" if result.severed else "FAILED_NOT_CUT", result.detail, result.jammed)
+        result = self._bite(tool)
+        self.row = result.applied(self.row, self._wood.hangs() if result.severed else None)
+        # Blades that met say so, also when the wood hangs by its bark.
+        done = bool(result.severed) or result.detail == reasons.blades_met()
+        self._cutter.finish("DONE" if done else "FAILED_NOT_CUT", result.detail, result.jammed)
         if self._trace is not None:
             self._trace.event(self._cut_event(result, tool, setpoint))
+
+    def _bite(self, tool: Array) -> CutResult:
+        row, standing = self.row, self.row
+        if self._wind is not None:
+            near = {index for index, rod in row.standing() if np.linalg.norm(rod.start - tool[:3, 3]) < _NEAR_BLADES}
+            standing = self._wind.blown(row, self.time, near)
+        result = close_blades(standing, tool, self._config)
+        thickest = max((2.0 * item.rod.at(item.along)[1] for item in result.severed), default=0.0)
+        if result.severed and self._wood.fails(thickest):
+            jams = self._wood.jams()
+            return CutResult((), jams, reasons.blades_jammed() if jams else reasons.blades_met())
+        return result.at_rest(row)
 
     def _cut_event(self, result: CutResult, tool: Array, setpoint: Setpoint) -> dict[str, Any]:
         cutter = self._cutter
@@ -260,6 +350,7 @@ class SimulatedRobot:
                     "vine": item.rod.vine,
                     "spur": item.rod.spur,
                     "cane": item.rod.cane,
+                    "along": item.along,
                     "point": item.point.tolist(),
                 }
                 for item in result.severed

@@ -64,8 +64,14 @@ class Row:
         """Index and rod of all that are not removed."""
         return ((index, rod) for index, rod in enumerate(self.rods) if rod is not None)
 
-    def sever(self, index: int, fraction: float) -> "Row":
-        """The row after a cut through rod `index` at `fraction` of its length, without all that it carried beyond.
+    def sever(self, index: int, fraction: float, hangs: Array | None = None) -> "Row":
+        """The row after a cut through rod `index` at `fraction` of its length.
+
+        Args:
+            index: Of the rod.
+            fraction: Of its length.
+            hangs: How far all that it carried beyond is moved (3, m), where it hangs in the wires; None where it falls
+                and is gone.
 
         Raises:
             IndexError: The rod is removed or does not exist.
@@ -74,6 +80,21 @@ class Row:
         if cut is None:
             raise IndexError(f"rod {index} has been removed already")
         point, radius = cut.at(fraction)
+        gone = self._beyond(index, cut, fraction)
+        rods = [None if i in gone else rod for i, rod in enumerate(self.rods)]
+        rods[index] = replace(cut, end=point, end_radius=radius)
+        if hangs is not None:
+            for i in gone:
+                rod = self.rods[i]
+                assert rod is not None
+                parent = -1 if rod.parent == index else rod.parent
+                rods[i] = replace(rod, start=rod.start + hangs, end=rod.end + hangs, parent=parent)
+            beyond = replace(cut, start=point + hangs, end=cut.end + hangs, start_radius=radius, parent=-1)
+            rods.append(beyond)
+        return Row(tuple(rods), self.revision + 1, self.backdrop)
+
+    def _beyond(self, index: int, cut: Rod, fraction: float) -> set[int]:
+        """Indices of all rods that a rod carries beyond a fraction of its length."""
         length = float(np.linalg.norm(cut.end - cut.start))
         gone: set[int] = set()
         for child, rod in self.standing():
@@ -83,6 +104,4 @@ class Row:
                 along = float(np.dot(rod.start - cut.start, cut.end - cut.start)) / max(length**2, 1e-12)
                 if along > fraction:
                     gone.add(child)
-        rods = [None if i in gone else rod for i, rod in enumerate(self.rods)]
-        rods[index] = replace(cut, end=point, end_radius=radius)
-        return Row(tuple(rods), self.revision + 1, self.backdrop)
+        return gone

@@ -1,0 +1,173 @@
+"""`rolling-panda bench world`: rows worked off as by `bench row`, in a calm and a rough world.
+
+The judge reads the truth in the plant's own frame: which rod was severed, and where along it. A place in `odom` is no
+truth where odometry drifts.
+"""
+
+import argparse
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+
+from msgspec.structs import replace
+
+from benchmarks.common.documents import bench_parser, write
+from benchmarks.common.intervals import Figure, quantile, share
+from benchmarks.control.row import cut_row
+from benchmarks.control.row_report import Cut, RowRun
+from bridge.sim.vineyard.truth import KEPT_NODES
+from bridge.sim.world.config import CALM, PRESETS, WorldConfig, only
+from perception.segmentation.segmenter import SEGMENTERS
+from rolling_panda.errors import InputError
+
+#: Disturbances that belong together, for `--each`.
+DISTURBANCES: dict[str, tuple[str, ...]] = {
+    "hand-eye": ("hand_eye_angle", "hand_eye_shift"),
+    "focal length": ("focal_error",),
+    "frame time": ("frame_delay", "frame_jitter"),
+    "joints": ("joint_offset",),
+    "arm on base": ("mount_angle", "mount_shift"),
+    "wheels": ("wheel_error",),
+    "slip": ("slip",),
+    "slope": ("slope_along", "slope_across"),
+    "bumps": ("bumps",),
+    "wind": ("sway",),
+    "lost depth": ("depth_lost",),
+    "blades": ("blade_failures",),
+    "hanging canes": ("hanging",),
+}
+
+
+@dataclass(frozen=True)
+class Condition:
+    """One world: what disturbs it, how much, and the world."""
+
+    name: str
+    level: str
+    world: WorldConfig
+
+
+def conditions(presets: Sequence[str], each: bool, knobs: dict[str, float]) -> list[Condition]:
+    """What to run: presets as a whole, each disturbance by itself, or a calm world with some values.
+
+    Raises:
+        InputError: A knob has no such name or value.
+    """
+    if knobs:
+        unknown = next((name for name in knobs if name not in WorldConfig.__struct_fields__ or name == "preset"), None)
+        if unknown is not None:
+            raise InputError(f"--knob {unknown}: known are {', '.join(WorldConfig.__struct_fields__[1:])}")
+        return [Condition(", ".join(f"{k} = {v:g}" for k, v in knobs.items()), "given", replace(CALM, **knobs))]
+    if not each:
+        return [Condition("all", preset, PRESETS[preset]) for preset in presets]
+    alone = [
+        Condition(name, preset, only(knobs, preset))
+        for name, knobs in DISTURBANCES.items()
+        for preset in presets
+        if preset != "calm"
+    ]
+    return [Condition("none", "calm", CALM), *alone]
+
+
+def summarise(runs: Sequence[RowRun]) -> dict[str, Figure]:
+    """The figures of rows in one world; shares are of the accepted points unless the name says otherwise."""
+    cuts = [cut for run in runs for cut in run.cuts]
+    made = [cut for cut in cuts if cut.past_best is not None or cut.harm]
+    ends = [cut.nodes_left for cut in made if cut.nodes_left is not None]
+    past = [abs(cut.past_best) for cut in made if cut.past_best is not None]
+
+    def of(hits: Sequence[Cut]) -> Figure:
+        return share(len(hits), len(cuts))
+
+    return {
+        "right": of([cut for cut in cuts if cut.true_right]),
+        "right_of_made": share(sum(cut.true_right for cut in made), len(made)),
+        "right_cane_of_made": share(sum(cut.right_cane for cut in made), len(made)),
+        "right_nodes_of_made": share(sum(nodes == KEPT_NODES for nodes in ends), len(ends)),
+        "harmed": of([cut for cut in cuts if cut.harm]),
+        "void": of([cut for cut in cuts if cut.state == "PROPOSED"]),
+        "refused": of([cut for cut in cuts if cut.state in ("UNREACHABLE", "FAILED_NOT_CUT")]),
+        "unknown": of([cut for cut in cuts if cut.state == "UNKNOWN"]),
+        "from_best_m_median": quantile(past, 0.5),
+        "from_best_m_p95": quantile(past, 0.95),
+        "rows_with_contact": share(sum(run.contacts + run.self_contacts > 0 for run in runs), len(runs)),
+        "rows_stopped": share(sum(run.stops > 0 for run in runs), len(runs)),
+    }
+
+
+def told(figure: Figure) -> str:
+    """A share as text, with its interval."""
+    if figure.value is None or figure.low is None or figure.high is None:
+        return "-"
+    return f"{100 * figure.value:3.0f} % ({100 * figure.low:.0f}-{100 * figure.high:.0f}, n {figure.n})"
+
+
+def main(argv: Sequence[str]) -> int:
+    """Run the benchmark; returns the exit code."""
+    parser = bench_parser("world", __doc__)
+    parser.add_argument("--preset", action="append", choices=tuple(PRESETS), help="may be given several times; all")
+    parser.add_argument("--each", action="store_true", help="one disturbance at a time, from calm to storm")
+    parser.add_argument(
+        "--knob", action="append", type=_knob, default=[], metavar="NAME=VALUE", help="a calm world but"
+    )
+    parser.add_argument("--seed", type=_count, default=2000, help="first seed (default: %(default)s)")
+    parser.add_argument("--count", type=_count, default=20, help="rows in each world (default: %(default)s)")
+    parser.add_argument("--points", type=_count, default=4, help="most points accepted in a row (default: 4)")
+    parser.add_argument("--pictures", type=float, default=0.7, help="pictures a second in motion (default: 0.7)")
+    parser.add_argument("--segmenter", default="", choices=SEGMENTERS, help="in place of the configured one")
+    words = parser.parse_args(argv)
+    if words.each and words.knob:
+        parser.error("--each and --knob exclude each other")
+    summary: dict[str, dict[str, object]] = {}
+    results: list[dict[str, object]] = []
+    for case in conditions(words.preset or tuple(PRESETS), words.each, dict(words.knob)):
+        runs: list[RowRun] = []
+        for seed in range(words.seed, words.seed + words.count):
+            begin = time.perf_counter()
+            run = cut_row(seed, words.points, "hierarchy", words.pictures, segmenter=words.segmenter, world=case.world)
+            runs.append(run)
+            results += [{"disturbance": case.name, "level": case.level, **asdict(cut)} for cut in run.cuts]
+            right, harmed = sum(cut.true_right for cut in run.cuts), sum(bool(cut.harm) for cut in run.cuts)
+            print(
+                f"{case.name}, {case.level}, seed {seed}: {right} of {len(run.cuts)} right, {harmed} harmed, "
+                f"{run.contacts} contacts, {time.perf_counter() - begin:.0f} s",
+                flush=True,
+            )
+            for cut in run.cuts:
+                if not cut.true_right:
+                    past = "" if cut.past_best is None else f", {1000 * cut.past_best:+.0f} mm past the best place"
+                    print(f"    {cut.point_id}: {cut.state} {cut.reason}{past} {cut.harm}", flush=True)
+        figures = summarise(runs)
+        print(
+            f"  right {told(figures['right'])}; of cuts made {told(figures['right_of_made'])}; "
+            f"void {told(figures['void'])}; harmed {told(figures['harmed'])}",
+            flush=True,
+        )
+        summary[f"{case.name}, {case.level}"] = {name: asdict(figure) for name, figure in figures.items()}
+        # A run over many worlds takes hours: what is done is on disk.
+        write(
+            words.json,
+            {
+                "pictures_hz": words.pictures,
+                "segmenter": words.segmenter,
+                "rows": words.count,
+                "first_seed": words.seed,
+                "summary": summary,
+                "results": results,
+            },
+        )
+    return 0
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"{text!r} is no count; give an integer from 0")
+    return int(text)
+
+
+def _knob(text: str) -> tuple[str, float]:
+    name, _, value = text.partition("=")
+    try:
+        return name.strip(), float(value)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no NAME=VALUE, such as hand_eye_angle=0.01") from None
