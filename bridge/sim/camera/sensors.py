@@ -13,8 +13,8 @@ from bridge.sim.vineyard.row import Array
 _STEP = 0.04
 #: Fractions of the pixels with edge artifacts that get the foreground depth and a mixture; the rest gets none.
 _NEARER, _MIXED = 0.45, 0.15
-#: Objects narrower than this are thin wood in the sun (px): a cane of 8 mm at 0.3 m.
-_THIN = 12.0
+#: Objects narrower than this are thin wood (m): canes and spurs, not cordons.
+_THIN = 0.02
 #: Size of the patches without depth (px).
 _PATCH = 6
 
@@ -52,7 +52,9 @@ def depth_sensor(
     counted = np.round(noisy / unit) * unit
     if config.thin_width > 0.0 or thin_lost > 0.0:
         lost = np.clip(1.0 - pixel_width / np.float32(max(config.thin_width, 1e-6)), 0.0, 1.0)
-        lost = np.maximum(lost, np.where(pixel_width < _THIN, np.float32(thin_lost), np.float32(0.0)))
+        if thin_lost > 0.0:
+            thin = pixel_width < np.float32(_THIN * focal) / np.maximum(true, np.float32(config.min_range))
+            lost = np.maximum(lost, np.where(thin, np.float32(thin_lost), np.float32(0.0)))
         seen &= _patches(depth.shape, rng) >= lost
     return np.where(seen, counted, np.float32(0.0)).astype(np.float32)
 

@@ -223,6 +223,12 @@ class SimulatedRobot:
         velocity = np.array([c * vx + s * vy, c * vy - s * vx, self._data.qvel[5]])
         return TrueBase(np.array([x, y, self._heading]), velocity)
 
+    def true_base_rotation(self) -> Array:
+        """Ground truth of the base's orientation R_world_base (3×3), which pitches and rolls on uneven ground."""
+        R = np.zeros(9)
+        mujoco.mju_quat2Mat(R, self._data.qpos[3:7])
+        return R.reshape(3, 3)
+
     def true_tool(self) -> Array:
         """Ground truth T_world_tool (4×4)."""
         return self._site(self._plant.tool)

@@ -1,0 +1,74 @@
+"""The benchmark in a rough world: which worlds it runs, what it counts, what it refuses, and its picture."""
+
+import json
+from pathlib import Path
+
+import pytest
+from matplotlib.figure import Figure
+
+from benchmarks.control import world as bench
+from benchmarks.control.row_report import Cut
+from benchmarks.control.world_plot import draw_world
+from bridge.sim.world.config import CALM, PRESETS, WorldConfig, only
+from rolling_panda.errors import InputError
+from tests.benchmarks.test_row_report import run
+
+
+def cut(state="DONE", right=True, harm="", past: float | None = 0.002, nodes: int | None = 2) -> Cut:
+    made = past is not None
+    return Cut("hierarchy", 1, "p", state, "", None, None, 3.0, right, harm, made, nodes if made else None, past)
+
+
+def test_each_disturbance_is_run_by_itself_and_every_knob_belongs_to_one() -> None:
+    knobs = [knob for group in bench.DISTURBANCES.values() for knob in group]
+    assert sorted(knobs) == sorted(WorldConfig.__struct_fields__[1:])
+    cases = bench.conditions(tuple(PRESETS), True, {})
+    assert len(cases) == 1 + 2 * len(bench.DISTURBANCES) and cases[0].world == CALM
+    slip = next(case for case in cases if (case.name, case.level) == ("slip", "storm"))
+    assert slip.world == only(("slip",), "storm") and slip.world.sway == 0.0 < slip.world.slip
+    assert [case.world for case in bench.conditions(("field",), False, {})] == [PRESETS["field"]]
+    (given,) = bench.conditions((), False, {"hand_eye_angle": 0.01})
+    assert given.world.hand_eye_angle == 0.01 and given.world.slip == 0.0
+
+
+def test_a_knob_without_such_a_name_is_refused_with_those_that_there_are() -> None:
+    with pytest.raises(InputError, match=r"hand_eye: known are hand_eye_angle, "):
+        bench.conditions((), False, {"hand_eye": 0.01})
+    with pytest.raises(SystemExit):
+        bench.main(["--knob", "slip"])
+    with pytest.raises(SystemExit):
+        bench.main(["--each", "--knob", "slip=0.1"])
+
+
+def test_shares_are_of_the_accepted_and_of_the_cuts_that_were_made() -> None:
+    wrong, harmful = cut(right=False, past=0.04, nodes=3), cut(right=False, harm="a node", past=-0.03, nodes=1)
+    void, refused = cut("PROPOSED", False, past=None), cut("FAILED_NOT_CUT", False, past=None)
+    figures = bench.summarise([run(cut(), cut(), wrong), run(harmful, void, refused, cut("UNKNOWN", past=0.001))])
+    assert (figures["right"].value, figures["right"].n) == (pytest.approx(3 / 7), 7)
+    assert (figures["right_of_made"].value, figures["right_of_made"].n) == (pytest.approx(3 / 5), 5)
+    assert figures["right_nodes_of_made"].value == pytest.approx(3 / 5)
+    assert [figures[name].value for name in ("void", "refused", "unknown", "harmed")] == [pytest.approx(1 / 7)] * 4
+    low, high = figures["right"].low, figures["right"].high
+    assert low is not None and high is not None and low < 3 / 7 < high
+
+
+def test_what_was_run_is_on_disk_and_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    worlds: list[tuple[int, WorldConfig]] = []
+
+    def worked_off(seed, points, method, pictures, segmenter, world):
+        worlds.append((seed, world))
+        return run(cut(), cut(right=world == CALM))
+
+    monkeypatch.setattr(bench, "cut_row", worked_off)
+    path = tmp_path / "world.json"
+    assert bench.main(["--count", "2", "--json", str(path)]) == 0
+    assert [seed for seed, _ in worlds] == [2000, 2001] * 3
+    assert [world for _, world in worlds[::2]] == list(PRESETS.values())
+    summary = json.loads(path.read_text())["summary"]
+    assert summary["all, calm"]["right"]["value"] == 1.0 and summary["all, storm"]["right"]["value"] == 0.5
+    assert bench.main(["--each", "--count", "1", "--json", str(tmp_path / "world_each.json")]) == 0
+    figure = Figure()
+    draw_world(tmp_path, figure)
+    assert {axes.get_title() for axes in figure.axes if axes.get_visible()} >= {"all (n 4)", "slip (n 2)"}
+    with pytest.raises(FileNotFoundError):
+        draw_world(tmp_path / "nowhere", Figure())
