@@ -123,7 +123,7 @@ def cut_row(
                 seed=seed,
                 point_id=entry.point_id,
                 state=end.state,
-                reason="" if end.reason is None else end.reason.code,
+                reason=_codes(end.reason),
                 distance=min((math.dist(piece["point"], where) for piece in pieces), default=None),
                 tool_error=None if event is None else math.dist(event["blade"], where),
                 duration_s=durations.get(entry.point_id, 0.0),
@@ -149,6 +149,13 @@ def cut_row(
         canes_touched=_spared(touches, record.events),
         staying_touched=_named(touches.touched_staying),
     )
+
+
+def _codes(reason: m.Reason | None) -> str:
+    """Code of a reason, with the codes of those that it gives: `acceptance_void: other_cane`."""
+    if reason is None:
+        return ""
+    return ": ".join([reason.code, *(_codes(value) for _, value in reason.values if isinstance(value, m.Reason))])
 
 
 def _row(loop: ClosedLoop) -> Row:

@@ -21,7 +21,7 @@ class Cut:
         seed: Of the row.
         point_id: Its name.
         state: How it ended.
-        reason: Code of the reason; empty without one.
+        reason: Code of the reason, with those of its causes; empty without one.
         distance: From the accepted point to what was severed (m); None when nothing was.
         tool_error: From the accepted point to the middle of the blades as they closed (m); None when they did not.
         duration_s: Since the cut before it, or since the start (s, simulated).

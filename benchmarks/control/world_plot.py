@@ -42,7 +42,7 @@ def draw_world(folder: Path, figure: Figure) -> None:
     panels = figure.subplots(rows, min(_COLUMNS, len(names)), sharex=True, sharey=True, squeeze=False).ravel()
     for panel, name in zip(panels, names, strict=False):
         points = {"calm": calm, **curves[name]}
-        shown = [(k, points[level]) for k, level in enumerate(_LEVELS) if points.get(level)]
+        shown = [(k, point) for k, level in enumerate(_LEVELS) if (point := points.get(level)) is not None]
         places = [k for k, _ in shown]
         values = [100 * point["value"] for _, point in shown]
         below = [value - 100 * point["low"] for value, (_, point) in zip(values, shown, strict=True)]
