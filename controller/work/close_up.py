@@ -24,12 +24,12 @@ _LOST_S = 1.5
 
 @dataclass
 class _Asked:
-    """A close-up in progress: expected finding, newest request, first request that counts, retries left."""
+    """A close-up in progress: expected finding, newest request, first request that counts, pictures that came."""
 
     expected: Finding
     number: int
     first: int
-    more: int
+    came: int
     begun: float
     since: float
     sent_at: float = -math.inf
@@ -39,15 +39,16 @@ class _Asked:
 class CloseUpClient:
     """Requests close-up pictures, several points at a time. The newest request for a point counts."""
 
-    def __init__(self, timeout_s: float, pictures: int) -> None:
+    def __init__(self, timeout_s: float, pictures: int, blind: int = 0) -> None:
         """Start without requests.
 
         Args:
             timeout_s: Time limit of one close-up, retries included (s).
             pictures: Largest number of pictures of one close-up. Another one is taken if the last did not show
                 what was expected.
+            blind: The same while the pictures are not conclusive; 0 for as many as `pictures`.
         """
-        self._timeout_s, self._pictures = timeout_s, pictures
+        self._timeout_s, self._pictures, self._blind = timeout_s, pictures, blind or pictures
         self._asked: dict[str, _Asked] = {}
         self._number = 0
         #: Time from the request to the result, of the last picture that came (s).
@@ -56,7 +57,7 @@ class CloseUpClient:
     def ask(self, point_id: str, expected: Finding, now: float) -> None:
         """Request a close-up of a point. A result that is not as expected is checked with another picture."""
         self._number += 1
-        self._asked[point_id] = _Asked(expected, self._number, self._number, self._pictures - 1, now, now)
+        self._asked[point_id] = _Asked(expected, self._number, self._number, 0, now, now)
 
     def forget(self, point_id: str) -> None:
         """Drop the close-up of this point."""
@@ -68,8 +69,9 @@ class CloseUpClient:
         # A late result counts too: on a slow machine each picture is late.
         if asked is None or not asked.first <= result.number <= asked.number or asked.answer is not None:
             return
-        if result.finding != asked.expected and asked.more > 0:
-            asked.more -= 1
+        asked.came += 1
+        most = self._blind if result.finding == "unseen" else self._pictures
+        if result.finding != asked.expected and asked.came < most:
             self._again(asked, now)
             asked.first = asked.number
         else:

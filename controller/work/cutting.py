@@ -667,8 +667,8 @@ def _shift(motion: ToolMotion, position: Array) -> None:
         motion.shift(moved)
 
 
-#: Largest number of pictures of one close-up.
-_PICTURES = 2
+#: Largest number of pictures of one close-up, and while they are not conclusive: in low sun each lacks other depth.
+_PICTURES, _BLIND_PICTURES = 2, 4
 
 
 class CutSequence:
@@ -690,7 +690,7 @@ class CutSequence:
         `run_id` makes the cut ids of this start unique. `known` gives the planned cut of a point, and
         `permit` the reason why the robot may not approach it.
         """
-        close_ups = CloseUpClient(config.work.close_up_timeout_s, _PICTURES)
+        close_ups = CloseUpClient(config.work.close_up_timeout_s, _PICTURES, _BLIND_PICTURES)
         check = PostCutCheck(queue, close_ups, config.work.post_cut_check)
         self._parts = Parts(
             config,

@@ -122,7 +122,8 @@ def check_close_up(
             return result("severed")
         return result("unseen", reasons.cane_hidden() if beyond == "not visible" else reasons.no_cane_at_place())
     if cane.end < limits.probe_distance:
-        if cane.end_reason == "free":
+        # Wood beyond may lack depth alone, as in low sun.
+        if cane.end_reason == "free" and beyond == "gone":
             return result("severed")
         return result("unseen", reasons.beyond_cut_hidden(), cane)
     if shift is None and cane.distance > limits.sure_offset:

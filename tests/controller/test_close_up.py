@@ -34,6 +34,22 @@ def test_a_picture_that_shows_nothing_is_taken_once_more_under_a_new_number() ->
     assert answer is not None and answer.finding == "unseen"
 
 
+def test_pictures_that_show_nothing_may_be_more_than_those_that_contradict_what_is_expected() -> None:
+    client = CloseUpClient(8.0, 2, 4)
+    client.ask("a", "seen", 0.0)
+    for number in (1, 2, 3):
+        client.update(look(number, "unseen"), 0.1 * number)
+        assert client.answer("a", 0.1 * number) is None
+    client.update(look(4), 0.5)
+    answer = client.answer("a", 0.5)
+    assert answer is not None and answer.finding == "seen"
+    client.ask("b", "seen", 1.0)
+    client.update(look(5, "severed", "b"), 1.1)
+    client.update(look(6, "severed", "b"), 1.2)
+    answer = client.answer("b", 1.2)
+    assert answer is not None and answer.finding == "severed"
+
+
 def test_a_lost_picture_is_asked_for_anew_and_a_look_ends_whatever_comes() -> None:
     client = CloseUpClient(5.0, 1)
     client.ask("a", "seen", 0.0)

@@ -148,6 +148,17 @@ def test_after_the_cut_it_says_that_the_wood_beyond_is_off_and_before_never(scen
     assert all(look(view, point(cut)).finding == "seen" for cut, view in scene.pairs())
 
 
+def test_a_cane_whose_depth_is_lost_beyond_the_cut_is_not_taken_for_one_that_is_cut(scene: Scene) -> None:
+    for cut, view in scene.pairs():
+        u, v, z = view.pixels(cut.best + 0.012 * cut.tangent)[0]
+        far = view.pixels(cut.best + 0.06 * cut.tangent)[0]
+        rows = slice(max(0, round(min(v, far[1]))), round(max(v, far[1])) + 1)
+        columns = slice(max(0, round(min(u, far[0])) - 12), round(max(u, far[0])) + 13)
+        depth = view.depth.copy()
+        depth[rows, columns] = 0.0
+        assert z > 0.0 and look(replace(view, depth=depth), point(cut)).finding in ("seen", "unseen")
+
+
 def test_from_too_far_or_out_of_the_picture_it_says_nothing_and_why(scene: Scene) -> None:
     cut = scene.cuts[0]
     far = look(view_from_clear(scene.row, cut, clearance=0.6), point(cut))
