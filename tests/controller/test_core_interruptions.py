@@ -25,7 +25,7 @@ def test_a_point_accepted_anew_at_another_place_while_the_tool_comes_out_is_cut_
     first, second = point("p0", (0.2, 0.75, 1.05)), point("p1", (0.5, 0.75, 1.05))
     r = working((first, second))
     until_retreating_from_the_first(r)
-    moved = point("p1", (0.54, 0.75, 1.05), revision=2)
+    moved = point("p1", (0.54, 0.75, 1.05), revision=2, cane=1)
     r.show((first, moved))
     r.step()
     assert r.ask(intents.AcceptPoint(user="ada", point_id="p1", revision=2)).ok
