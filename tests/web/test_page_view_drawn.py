@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
+from tests.support.page_parts import open_screen
 from tests.support.played_page import box_of, until
 from tests.support.played_server import ORIGIN, VIEW, PlayedServer
 
@@ -71,6 +72,7 @@ def test_words_stand_in_its_place_until_the_robot_is_drawn(page: Page) -> None:
 
 def test_a_press_on_the_words_moves_nothing(page: Page, server: PlayedServer) -> None:
     box = box_of(page.locator("rp-scene iframe"))
+    open_screen(page, "drive")
     page.locator("#teleop").click()
     page.mouse.move(box["x"] + 100, box["y"] + 100)
     page.mouse.down()
