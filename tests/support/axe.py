@@ -21,6 +21,11 @@ def axe() -> str:
 
 def grave(page: Page, source: str, *rules: str) -> list[str]:
     """Serious and critical violations on the page as it is now, of these rules alone where any are named."""
+    return violations(page, source, *rules, impacts=GRAVE)
+
+
+def violations(page: Page, source: str, *rules: str, impacts: tuple[str, ...] = ()) -> list[str]:
+    """Violations on the page as it is now, of these rules and impacts alone where any are named."""
     page.evaluate(source)
     found = page.evaluate(_RUN, list(rules))
-    return [f"{rule}: {' | '.join(nodes[:3])}" for impact, rule, nodes in found if impact in GRAVE]
+    return [f"{rule}: {' | '.join(nodes[:3])}" for impact, rule, nodes in found if not impacts or impact in impacts]

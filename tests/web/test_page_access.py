@@ -1,12 +1,14 @@
 """What assistive technology, a finger and a tired eye need of the page, in every state that it has."""
 
+from typing import Literal
+
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from rolling_panda import reasons
 from rolling_panda.messages import page as p
 from rolling_panda.reasons import text_of
-from tests.support.axe import axe, grave
+from tests.support.axe import axe, grave, violations
 from tests.support.page_parts import leave, open_screen
 from tests.support.page_states import STATES
 from tests.support.played_page import box_of
@@ -42,6 +44,21 @@ def test_nothing_keeps_anybody_from_using_the_page(page: Page, server: PlayedSer
         # Darkness changes colours and nothing else.
         page.emulate_media(color_scheme="dark", reduced_motion="reduce")
         found += [f"{name}, dark: {problem}" for problem in grave(page, axe, "color-contrast")]
+    assert not found, "\n".join(found)
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_finds_nothing_on_any_screen(
+    page: Page, server: PlayedServer, axe: str, scheme: Literal["light", "dark"]
+) -> None:
+    page.emulate_media(color_scheme=scheme, reduced_motion="reduce")
+    found: list[str] = []
+    STATES["alarms"](page, server)
+    for name in ("work", "review", "drive", "report", "engineer"):
+        open_screen(page, name)
+        for width, height in ((1280, 800), (390, 844)):
+            page.set_viewport_size({"width": width, "height": height})
+            found += [f"{name}, {width}: {problem}" for problem in violations(page, axe)]
     assert not found, "\n".join(found)
 
 

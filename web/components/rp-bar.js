@@ -33,7 +33,7 @@ class RpBar extends HTMLElement {
   none = element("p", { class: "hint", text: text("bar.nothing_more") });
 
   connectedCallback() {
-    this.setAttribute("role", "group");
+    this.setAttribute("role", "region");
     this.setAttribute("aria-label", text("command.label"));
     for (const name of STEPS) this.add(name);
     this.steps.get("Survey")?.box.append(distanceChoice());

@@ -176,7 +176,7 @@ function alarmList() {
       }),
     );
   });
-  return element("div", { class: "body" }, list, none);
+  return element("div", { class: "body", attributes: { tabindex: "0" } }, list, none);
 }
 
 /** Each process with its version, how long it runs, and the age of its last message. */
@@ -213,7 +213,7 @@ function processTable() {
     setText(versions, different ? text("processes.versions_differ") : "");
   });
   const head = ["process", "version", "runs", "age"].map((each) => element("th", { text: text(`processes.${each}`), attributes: { scope: "col" } }));
-  return element("div", { class: "body" }, element("table", {}, element("thead", {}, element("tr", {}, ...head)), body), versions);
+  return element("div", { class: "body", attributes: { tabindex: "0" } }, element("table", {}, element("thead", {}, element("tr", {}, ...head)), body), versions);
 }
 
 /** Every topic of the wire with its rate and age, as the server receives it. */
@@ -241,7 +241,7 @@ function topicTable() {
   const head = ["topic", "sender", "rate", "nominal", "age", "count", "rejected"].map((each) =>
     element("th", { text: text(`topics.${each}`), attributes: { scope: "col", title: text(`topics.${each}.hint`) } }),
   );
-  return element("div", { class: "body" }, element("table", {}, element("thead", {}, element("tr", {}, ...head)), body), none);
+  return element("div", { class: "body", attributes: { tabindex: "0" } }, element("table", {}, element("thead", {}, element("tr", {}, ...head)), body), none);
 }
 
 /** @param {TopicTraffic} topic */
@@ -298,6 +298,6 @@ function modelList() {
     drawnPoints = pointsKey;
     body.replaceChildren(...words.map((cells) => element("tr", {}, ...cells.map((cell) => element("td", { text: cell })))));
   });
-  return element("div", { class: "body" }, list, digests);
+  return element("div", { class: "body", attributes: { tabindex: "0" } }, list, digests);
 }
 customElements.define("rp-engineer", RpEngineer);
