@@ -40,8 +40,8 @@ COVERED = """over => [...document.querySelectorAll("button, select, input, summa
 CUT = "all => all.filter(each => each.scrollWidth > each.clientWidth + 1).map(each => each.outerHTML.slice(0, 120))"
 #: What scrolls sideways, other than tables.
 SIDEWAYS = """() => [...document.querySelectorAll("main, main *")].filter(each => each.checkVisibility() &&
-  ["auto", "scroll"].includes(getComputedStyle(each).overflowX) && !each.querySelector("table") && each.scrollWidth > each.clientWidth + 1)
-  .map(each => each.localName + "." + each.className)"""
+  ["auto", "scroll"].includes(getComputedStyle(each).overflowX) && !each.querySelector("table") &&
+  each.scrollWidth > each.clientWidth + 1).map(each => each.localName + "." + each.className)"""
 TO_THE_END = "() => { for (const each of [document.documentElement, document.body]) each.scrollTo(0, 1e6); }"
 TO_THE_TOP = "() => { for (const each of [document.documentElement, document.body]) each.scrollTo(0, 0); }"
 
