@@ -48,6 +48,7 @@ class Ticket:
         seen: Whether perception currently reports the point.
         proposer: Segmenter that proposed it, with the hash of its network; empty for a point by hand.
         wrong_by: Who has said that its cut was wrong; empty without anyone.
+        bound: Which cut was accepted, by the numbers of the present run of perception; empty before it was seen again.
     """
 
     point: PruningPoint
@@ -60,6 +61,7 @@ class Ticket:
     seen: bool = True
     proposer: str = ""
     wrong_by: str = ""
+    bound: tuple[str | int, ...] = ()
 
 
 class PointQueue:
@@ -114,7 +116,11 @@ class PointQueue:
             proposer = _proposer(point, points) if ticket.state == "PROPOSED" else ticket.proposer
             known, ticket = ticket, replace(ticket, point=point, seen=True, proposer=proposer)
             why = _by_rule(known, point, rule) if rule is not None and known.seen else None
-            why = why or self._changed(ticket, by_place=restarted or not known.seen)
+            if restarted or not known.seen:
+                ticket = replace(ticket, bound=())
+            why = why or self._changed(ticket)
+            if ticket.state in BOUND:
+                ticket = replace(ticket, bound=ticket.bound or identity(point))
             self._put(point.point_id, self._void(ticket, why, voided) if why else _with_shift(ticket))
         for point_id, ticket in list(self._tickets.items()):
             if point_id in seen or point_id == keep or not ticket.seen:
@@ -193,9 +199,8 @@ class PointQueue:
             return refused
         ticket = self._tickets[point_id]
         seen = ticket.point
-        self._put(
-            point_id, replace(ticket, state="ACCEPTED", reason=None, user=user, accepted=seen, hash=point_digest(seen))
-        )
+        accepted = replace(ticket, state="ACCEPTED", reason=None, user=user, accepted=seen, hash=point_digest(seen))
+        self._put(point_id, replace(accepted, bound=identity(seen)))
         return None
 
     def _acceptance_refused(self, point_id: str, revision: int, digest: str) -> Reason | None:
@@ -251,7 +256,7 @@ class PointQueue:
             return reasons.nothing_to_take_back(point_id, ticket.state)
         if not ticket.seen:
             return reasons.point_unseen(point_id)
-        self._put(point_id, replace(ticket, state="PROPOSED", reason=None, user=user, accepted=None, hash=""))
+        self._put(point_id, replace(ticket, state="PROPOSED", reason=None, user=user, accepted=None, hash="", bound=()))
         return None
 
     def proposed(self, confidence: float) -> list[PruningPoint]:
@@ -417,22 +422,17 @@ class PointQueue:
         return self._entries
 
     @staticmethod
-    def _changed(ticket: Ticket, by_place: bool = False) -> Reason | None:
-        """Why the acceptance of a ticket is void: its point is another cut, or cannot be told from another.
-
-        Args:
-            ticket: Accepted or not.
-            by_place: The numbers of spur and cane are of another run of perception.
-        """
+    def _changed(ticket: Ticket) -> Reason | None:
+        """Why the acceptance of a ticket is void: its point is another cut, or cannot be told from another."""
         if ticket.state not in BOUND or ticket.accepted is None:
             return None
         if ticket.point.nodes_kept != ticket.accepted.nodes_kept:
             return reasons.other_nodes_kept(ticket.accepted.nodes_kept, ticket.point.nodes_kept)
-        if by_place:
+        if not ticket.bound:
             moved = _apart(ticket.point, ticket.accepted)
             if moved > _SAME_PLACE:
                 return reasons.moved_over_restart(1e3 * moved)
-        elif identity(ticket.point) != identity(ticket.accepted):
+        elif identity(ticket.point) != ticket.bound:
             return reasons.other_cane()
         turned = float(np.clip(abs(np.dot(ticket.point.tangent, ticket.accepted.tangent)), 0.0, 1.0))
         if np.arccos(turned) > _TURNED_TOLERANCE:
@@ -442,7 +442,7 @@ class PointQueue:
     def _void(self, ticket: Ticket, why: Reason, voided: list[Reason]) -> Ticket:
         void = reasons.acceptance_void(why)
         voided.append(reasons.acceptance_lost(ticket.point.point_id, void))
-        return replace(ticket, state="PROPOSED", reason=void, accepted=None, hash="")
+        return replace(ticket, state="PROPOSED", reason=void, accepted=None, hash="", bound=())
 
     def move(self, point_id: str, before: str, revision: int, user: str) -> Reason | None:
         """Move an accepted point in the order of work. Returns the reason of a refusal; None if done.

@@ -72,12 +72,28 @@ def test_after_a_restart_of_perception_numbers_mean_nothing_and_the_place_decide
         q = queue()
         q.update(m.PruningPoints(header=m.Header(), segmenter="none", frames=90, points=(point(),)))
         q.accept("a", 3, "ada")
-        q.update(m.PruningPoints(header=m.Header(), segmenter="none", frames=4, points=(point(**changes),)))
+        for frames in (4, 5):
+            q.update(m.PruningPoints(header=m.Header(), segmenter="none", frames=frames, points=(point(**changes),)))
         return state(q)
 
     assert after_restart(spur=3, cane=2, position=(1.0, 0.85, 1.004)) == "ACCEPTED"
     assert after_restart(position=(1.0, 0.85, 1.006)) == "PROPOSED"
     assert after_restart(nodes_kept=3) == "PROPOSED"
+
+
+def test_after_a_restart_the_new_numbers_tell_the_cane():
+    q = queue()
+
+    def see(frames, cane):
+        q.update(m.PruningPoints(header=m.Header(), segmenter="none", frames=frames, points=(point(cane=cane),)))
+
+    see(90, 0)
+    q.accept("a", 3, "ada")
+    see(4, 2)
+    see(5, 2)
+    assert state(q) == "ACCEPTED"
+    see(6, 3)
+    assert state(q) == "PROPOSED" and q.get("a").reason == reasons.acceptance_void(reasons.other_cane())
 
 
 def test_a_point_that_vanished_is_not_cut_and_a_new_look_is_needed():

@@ -25,7 +25,7 @@ def lived(steps, seed, **changes):
 
 
 def test_random_steps_of_everything_together_break_nothing():
-    told = lived(8_000, seed=1).judge.told
+    told = lived(8_000, seed=2).judge.told
     for what in ("cuts", "releases", "starts of the bridge", "starts of the controller", "READY to TELEOP"):
         assert told[what] > 0, told
 

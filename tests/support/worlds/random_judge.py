@@ -21,7 +21,7 @@ class Judge:
     """`told` counts what happened, so that a run in which nothing happens proves nothing."""
 
     told: Counter = field(default_factory=Counter)
-    #: Where each accepted point was when somebody accepted it.
+    #: The cane of each accepted point when somebody accepted it.
     accepted: dict = field(default_factory=dict)
     #: Points whose acceptance is over by this record; it counts for good when that record is on disk.
     revoked: dict = field(default_factory=dict)
@@ -215,7 +215,7 @@ class Judge:
                 isinstance(intent, intents.AcceptAll) and (name not in self.accepted or name in self.revoked)
             ):
                 assert not self.bitten.get(name), f"{name}, on which the blades have closed, is accepted anew"
-                self.accepted[name] = world.queue.get(name).point.position
+                self.accepted[name] = world.queue.get(name).point.cane
                 self.revoked.pop(name, None)
             elif isinstance(intent, intents.RejectPoint | intents.ReconsiderPoint) and name in self.accepted:
                 self.revoked[name] = world.controller.recorded
@@ -223,18 +223,18 @@ class Judge:
                 self.bitten[name] = intent.outcome == "DONE"
 
     def _perceived(self, world):
-        """What moved or vanished is not accepted any more, unless its cut is under way."""
+        """What is on another cane or vanished is not accepted any more, unless its cut is under way."""
         points = world.inbox.newest(m.PruningPoints)
         if points is None:
             return
-        seen = {point.point_id: point.position for point in points.message.points}
-        for name, where in self.accepted.items():
+        seen = {point.point_id: point.cane for point in points.message.points}
+        for name, cane in self.accepted.items():
             ticket = world.queue.get(name)
             if name in self.revoked or ticket is None or ticket.state in ("CUTTING", "UNKNOWN"):
                 continue
             # After a start an acceptance waits until its point is seen again.
             vanished = name not in seen and name in self.shown_points
-            if vanished or (name in seen and np.linalg.norm(np.subtract(seen[name], where)) > 0.005):
+            if vanished or seen.get(name, cane) != cane:
                 self.revoked[name] = world.controller.recorded
         self.shown_points |= set(seen)
 

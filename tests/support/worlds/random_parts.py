@@ -52,9 +52,13 @@ class Sequence:
     def abort(self):
         self.active, self.in_canes, self._left, self._accepted = "", "", 0, None
 
-    def start(self, survey=0.0):
+    def start(self):
         self.abort()
-        self._survey = 20 if survey else 0
+        self._survey = 0
+
+    def survey(self, distance):
+        self.abort()
+        self._survey = 20 if distance else 0
 
     def finish_cut_and_pause(self, why):
         self.ending = why

@@ -36,6 +36,8 @@ from tests.support.worlds.random_parts import MODEL, CutDisk, Movement, Robot
 
 PEOPLE = {"ada": "supervisor", "bob": "operator", "vic": "viewer"}
 DT = 0.01
+#: A point this far aside is on the cane beside it (m).
+_OTHER_CANE = 0.008
 
 
 @dataclass
@@ -278,11 +280,11 @@ class RandomWorld:
 
     def perceive(self):
         self.offsets[self.chance.randrange(3)] = self.chance.choice(
-            (0.0, 0.002, 0.008) if self.chance.random() < 0.1 else (0.0,)
+            (0.0, 0.002, 0.02, _OTHER_CANE) if self.chance.random() < 0.1 else (0.0,)
         )
         self.revision += self.chance.random() < 0.2
         points = tuple(
-            point(name, (0.3 * place + offset, 0.75, 1.0), revision=self.revision)
+            point(name, (0.3 * place + offset, 0.75, 1.0), revision=self.revision, cane=int(offset == _OTHER_CANE))
             for place, (name, offset) in enumerate(zip(self.names, self.offsets, strict=True))
             if self.chance.random() < 0.98
         )
