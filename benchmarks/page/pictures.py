@@ -38,6 +38,17 @@ _PATIENCE_MS = 60_000
 
 #: Played states: what of the page is shown. All of it where nothing is said.
 PARTS = {
+    "no-points": "rp-work",
+    "survey": "rp-bar",
+    "viewer": "rp-bar",
+    "paused": "rp-alarms, rp-bar",
+    "fault": "rp-alarms, rp-bar",
+    "stop-pressed": "rp-stop-banner, rp-bar",
+    "signed-out": "rp-link-banner, rp-bar",
+    "preview-expired": "rp-preview, rp-bar",
+    "teleoperate-base": "rp-drive",
+    "teleoperate-joints": "rp-drive",
+    "held-back": "rp-drive",
     "invite": ".top, #person-menu",
     "asked-for-control": ".top, rp-lease",
     "other-has-control": ".top, rp-lease",
