@@ -118,6 +118,7 @@ def _train(words: argparse.Namespace, options: list[str]) -> None:
             f"no better on the held-out pictures than at the beginning (F {tuner.curve[0].f:.3f}) after {tuner.step} "
             f"steps; {words.out} is not written. Label more pictures, or look whether the labels fit"
         )
+    print("writes the network with its limit of familiarity; a minute or two", flush=True)
     figures = _write(words.out, tuner, datasets)
     data = [Data(d.manifest.source, d.manifest.licence, len(d.names("train"))) for d in datasets]
     before = begun.card.data if begun is not None and begun.card is not None else ()
