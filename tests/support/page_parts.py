@@ -88,6 +88,7 @@ def leave(page: Page, server: PlayedServer) -> None:
     server.tell(p.PagePreview(preview=PreviewState(header=m.Header(), required=False, phase="none")))
     if page.locator("#close-preview").is_visible():
         page.locator("#close-preview").click()
+    page.locator("dialog[open]").evaluate_all("all => all.forEach(each => each.close())")
     open_screen(page, "work")
     page.locator("details[open]").evaluate_all("all => all.forEach(each => { each.open = false; })")
 

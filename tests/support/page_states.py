@@ -316,6 +316,19 @@ def _invite(page: Page, server: PlayedServer) -> None:
     expect(page.locator("#invite-link")).to_be_visible()
 
 
+def _settings(page: Page, server: PlayedServer) -> None:
+    working(page, server)
+    page.locator("#person").click()
+    page.locator("#open-settings").click()
+    expect(page.locator("#settings")).to_be_visible()
+
+
+def _help(page: Page, server: PlayedServer) -> None:
+    working(page, server)
+    page.keyboard.press("?")
+    expect(page.locator("#help")).to_be_visible()
+
+
 def _refused(page: Page, server: PlayedServer) -> None:
     working(page, server)
     server.answers["/api/points/p3/accept"] = (409, {"ok": False, "reason": "p3 moved by 6 mm since you looked at it"})
@@ -364,7 +377,7 @@ def _charts(page: Page, server: PlayedServer) -> None:
 def _empty_report(page: Page, server: PlayedServer) -> None:
     working(page, server)
     open_screen(page, "report")
-    expect(page.locator("rp-report")).to_contain_text("Nothing has been cut yet.")
+    expect(page.locator("rp-report [role=status]").nth(1)).not_to_be_empty()
 
 
 def _report(page: Page, server: PlayedServer) -> None:
@@ -431,6 +444,8 @@ STATES: dict[str, State] = {
     "other-has-control": _other_has_control,
     "viewer": _viewer,
     "invite": _invite,
+    "settings": _settings,
+    "help": _help,
     "refused": _refused,
     "process-lost": _process_lost,
     "link-lost": _link_lost,

@@ -24,8 +24,8 @@ LANGUAGE = "eo"
 LETTERS = str.maketrans(
     "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ", "αвсδεғgнιјκℓмηορqяѕтυνωχуzΑВСΔΕҒGНΙЈΚLМΗΟΡQЯЅТΥΝΩΧΥZ"
 )
-#: What is the same in every language: names, units and formats of files.
-SAME = {"Rolling", "Panda", "Ada", "Bob", "mm", "ms", "min", "JSON", "CSV"}
+#: What is the same in every language: names, also of languages and keys, units and formats of files.
+SAME = {"English", "esperanto", "Esc", "nullspace", "Rolling", "Panda", "Ada", "Bob", "mm", "ms", "min", "JSON", "CSV"}
 #: Words for people: visible text, and the attributes that are read out or shown on hover.
 WORDS = """() => {
   const shown = [document.title];

@@ -105,7 +105,10 @@ FAMILIES: dict[str, Sequence[str]] = {
     "health.${}": ("robot", "camera"),
     "bar.${}": ("preview", "approve", "reset"),
     "bar.to_${}": ("review", "preview"),
-    "keys.${}": ("stop", "decide", "undo", "camera", "measure", "hold", "drive", "close", "help"),
+    "keys.${}": (
+        *("stop", "decide", "undo", "step", "add"),
+        *("camera", "measure", "hold", "drive", "close", "help"),
+    ),
     "hint.${}": ("next", "screens", "stop", "person"),
     # What a message names.
     "name.${}": (

@@ -278,7 +278,7 @@ function modelList() {
     if (screen.get() !== "engineer") return;
     const [state, page] = [pageState.get(), points.get()];
     const pairs = /** @type {const} */ ([
-      ["network", page?.segmenter],
+      ["network", page && labelOf(page.segmenter)],
       ["method", state?.controller?.method],
       ["robot", state?.bridge?.kind && text(`models.robot.${state.bridge.kind}`)],
       ["plan", page?.plan?.plan_hash],

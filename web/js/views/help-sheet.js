@@ -10,6 +10,8 @@ const KEYS = Object.freeze([
   { does: "stop", keys: ["space"] },
   { does: "decide", keys: ["A", "R"] },
   { does: "undo", keys: ["Z"] },
+  { does: "step", keys: ["←", "→"] },
+  { does: "add", keys: ["N"] },
   { does: "camera", keys: ["1", "2", "3", "4"] },
   { does: "measure", keys: ["M"] },
   { does: "hold", keys: ["H"] },
