@@ -195,3 +195,12 @@ def test_bad_words_end_in_one_line(tmp_path, good, capsys):
         said = capsys.readouterr().err
         assert said.startswith("rolling-panda models use: ") and said.count("\n") == 1
         assert not (tmp_path / "state").exists()
+
+
+def test_the_networks_of_the_tree_are_those_of_their_cards_with_the_command_and_the_licences():
+    networks = (shipped(), photographs())
+    assert sum(each.path.stat().st_size for each in networks) < 25e6
+    for each in networks:
+        assert each.card is not None and each.card.sha256 == hashlib.sha256(each.path.read_bytes()).hexdigest()
+        assert each.card.command.startswith("python -m perception.training")
+        assert each.card.data and all(data.source and data.licence for data in each.card.data)

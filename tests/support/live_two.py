@@ -9,7 +9,6 @@ from bridge.config import BridgeConfig, OdometryConfig
 from bridge.core.bridge import TICK_S, BridgeCore
 from bridge.core.odometer import Odometer
 from bridge.loop import bridge_runner
-from bridge.sim.robot.lagged import LaggedRobot
 from controller.config import ControllerConfig
 from controller.core import Controller
 from controller.ledger.start import restored
@@ -21,6 +20,7 @@ from rolling_panda.model.robot import RobotModel
 from rolling_panda.transport.zenoh import Transport
 from tests.support.processes.local_router import local_router
 from tests.support.running_server import running_server
+from tests.support.worlds.lagged_robot import LaggedRobot
 
 MODEL = RobotModel()
 CONFIG = ControllerConfig()

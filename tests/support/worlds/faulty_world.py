@@ -12,7 +12,6 @@ from bridge.config import BridgeConfig, OdometryConfig
 from bridge.core.bridge import TICK_S, BridgeCore
 from bridge.core.odometer import Odometer
 from bridge.core.state_memory import Remembered
-from bridge.sim.robot.lagged import LaggedRobot
 from controller.config import ControllerConfig
 from controller.core import Controller
 from rolling_panda import commands as intents
@@ -29,6 +28,7 @@ from server.auth.sessions import Session
 from server.robots.presence import PresenceTracker
 from tests.support.controller_config import controller_config
 from tests.support.points import point
+from tests.support.worlds.lagged_robot import LaggedRobot
 from tests.support.worlds.world import RobotWorld
 
 MODEL = RobotModel()
