@@ -696,6 +696,21 @@ def rule_effect_unknown() -> None:
     """It is not known yet what the rule would change."""
 
 
+@_reason("info", "wait, or zoom in when it is there")
+def picture_loading() -> None:
+    """The picture is on its way."""
+
+
+@_reason("info", "look at it, then decide")
+def cut_just_changed() -> None:
+    """This cut has just changed."""
+
+
+@_reason("info", "go on to the next")
+def point_vanished() -> None:
+    """This point is gone: nothing is cut here."""
+
+
 @_reason("info", "take that back first")
 def acceptance_stands(point: str) -> None:
     """{point} is accepted, and keeps its content."""
@@ -1725,7 +1740,7 @@ def canes_too_narrow(width: float, needed: float) -> None:
 # Perception: points by hand and the rule
 
 
-@_reason("info", "look at it in the queue")
+@_reason("info", "decide about it")
 def point_placed(point: str) -> None:
     """{point} is placed."""
 

@@ -48,9 +48,11 @@ def operator_page(
 
 
 def accept(page: Page, point_id: str) -> None:
-    """Choose a cut in the list, open it and accept it, as an operator does."""
-    page.click('[data-tab="work"]')
-    page.click(f'[data-cut="{point_id}"] button')
+    """Look at a cut's picture and accept it, as an operator does."""
     page.click('[data-tab="review"]')
-    page.click(f'rp-point[data-point-id="{point_id}"] button.accept')
+    page.click(f'.strip-mark[data-point-id="{point_id}"]')
+    page.wait_for_selector(f'rp-review[data-key="{point_id}"] #review-accept[aria-disabled="false"]')
+    # A press right after another picture has come was meant for the one before.
+    page.wait_for_timeout(300)
+    page.click("#review-accept")
     page.click('[data-tab="work"]')

@@ -3,7 +3,7 @@
 from typing import Any
 
 import msgspec
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Locator, Page, expect
 
 from rolling_panda import messages as m
 from rolling_panda.messages import page as p
@@ -11,7 +11,10 @@ from rolling_panda.messages.supervision import ControlState, PointPlan, PreviewS
 from tests.support.played_server import PlayedServer, controller, point
 from tests.support.points import rolled_out
 
-PLANNING = ("RequestPreview", "ApprovePreview", "RequirePreview", "SetApproach", "MoveInQueue", "ResetOrder", "Survey")
+PLANNING = (
+    "RequestPreview", "ApprovePreview", "RequirePreview", "SetApproach", "MoveInQueue", "ResetOrder", "Survey",
+    "LookAgain",
+)  # fmt: skip
 
 
 def ready(**changes: Any) -> m.ControllerState:
@@ -71,10 +74,25 @@ def open_screen(page: Page, name: str) -> None:
     expect(page.locator(f"rp-{name}:defined")).to_be_visible()
 
 
-def choose(page: Page, name: str) -> None:
+def choose(page: Page, name: str) -> Locator:
+    """Look at a point or a place."""
     open_screen(page, "review")
-    page.locator(f'rp-point[data-point-id="{name}"]').click(position={"x": 60, "y": 12})
-    expect(page.locator("rp-point-details .crop.loaded")).to_be_visible()
+    mark(page, name).click()
+    return looking_at(page, name)
+
+
+def mark(page: Page, key: str) -> Locator:
+    """The sign of a point or a place in the strip of all."""
+    return page.locator(f'.strip-mark[data-key="{key}"]')
+
+
+def looking_at(page: Page, key: str) -> Locator:
+    """The review, once this point or place is pictured, and may be decided about."""
+    review = page.locator(f'rp-review[data-key="{key}"][data-pictured="shown"]')
+    expect(review).to_be_visible()
+    # A press right after another picture has come was meant for the one before.
+    page.wait_for_timeout(260)
+    return review
 
 
 def leave(page: Page, server: PlayedServer) -> None:

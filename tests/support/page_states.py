@@ -30,6 +30,8 @@ from tests.support.page_parts import (
     accepted,
     choose,
     held,
+    looking_at,
+    mark,
     open_screen,
     planned,
     queue,
@@ -63,14 +65,14 @@ def _no_points(page: Page, server: PlayedServer) -> None:
     server.undecided_sites = ()
     show(server)
     open_screen(page, "review")
-    expect(page.locator("rp-point")).to_have_count(0)
+    expect(page.locator(".strip-mark")).to_have_count(0)
 
 
 def _process_lost(page: Page, server: PlayedServer) -> None:
     working(page, server)
     open_screen(page, "review")
     server.gone = {"controller": 6.0}
-    expect(page.locator("rp-queue.stale .stale-note")).not_to_be_empty()
+    expect(page.locator("rp-review.stale .stale-note")).not_to_be_empty()
 
 
 def _link_lost(page: Page, server: PlayedServer) -> None:
@@ -135,8 +137,9 @@ def _order(page: Page, server: PlayedServer) -> None:
 def _why_rejected(page: Page, server: PlayedServer) -> None:
     working(page, server)
     open_screen(page, "review")
-    page.locator('rp-point[data-point-id="p3"] .reject').click()
-    expect(page.locator("#reject-reason")).to_be_focused()
+    choose(page, "p3")
+    page.locator("#review-leave").click()
+    expect(page.locator("#reject-reason")).to_be_visible()
 
 
 def _by_hand(page: Page, server: PlayedServer) -> None:
@@ -156,8 +159,9 @@ def _places(page: Page, server: PlayedServer) -> None:
     )
     server.tell(server.page_points())
     open_screen(page, "review")
-    page.locator(".undecided-sites summary").first.click()
-    expect(page.locator("button.look-again").first).to_be_visible()
+    mark(page, "place-3-1").click()
+    looking_at(page, "place-3-1")
+    expect(page.locator("#look-again")).to_be_visible()
 
 
 def _unknown_cut(page: Page, server: PlayedServer) -> None:
@@ -333,7 +337,8 @@ def _refused(page: Page, server: PlayedServer) -> None:
     working(page, server)
     server.answers["/api/points/p3/accept"] = (409, {"ok": False, "reason": "p3 moved by 6 mm since you looked at it"})
     open_screen(page, "review")
-    page.locator('rp-point[data-point-id="p3"] .accept').click()
+    choose(page, "p3")
+    page.locator("#review-accept").click()
     expect(page.locator(".toast")).to_be_visible()
 
 

@@ -18,10 +18,12 @@ from rolling_panda import reasons
 from rolling_panda.commands import COMMANDS
 from rolling_panda.messages import page as page_messages
 from rolling_panda.messages import types as types_messages
+from rolling_panda.messages.perception import SpurDrawing
 from rolling_panda.messages.supervision import ControlState, ReplayState, SessionReport, StopState, Timeline
 from rolling_panda.reasons import said
 from rolling_panda.resources import resource
 from rolling_panda.topics import TOPICS
+from tests.support.drawings import SIZE, drawing
 from tests.support.fake_wire import bridge_state
 from tests.support.page_host import ORIGIN, PlayedRequest, PlayedSocket, page_host
 
@@ -135,7 +137,9 @@ class PlayedServer:
     posted: list[tuple[str, Any]] = field(default_factory=list)
     said: list[page_messages.FromPage] = field(default_factory=list)
     sockets: list[PlayedSocket] = field(default_factory=list)
-    crops_fetched: list[str] = field(default_factory=list)
+    pictures_fetched: list[str] = field(default_factory=list)
+    #: Points whose drawing shows this revision instead of the newest.
+    drawn_revisions: dict[str, int] = field(default_factory=dict)
     frames_fetched: list[int] = field(default_factory=list)
     report: SessionReport = field(default_factory=lambda: SessionReport(began_at=0.0, written_at=0.0))
     timeline: Timeline = field(default_factory=lambda: Timeline(began_at=0.0, ended_at=0.0))
@@ -144,7 +148,7 @@ class PlayedServer:
     cut_pictures: dict[tuple[str, str], bytes] = field(default_factory=dict)
     pictures_fetched: list[tuple[str, str]] = field(default_factory=list)
     rule: m.PruningRule | None = field(default_factory=m.PruningRule)
-    crop: bytes = field(default_factory=lambda: camera_image((240, 180)))
+    crop: bytes = field(default_factory=lambda: camera_image(SIZE))
     view: bytes = b""
     #: The page of the 3-D view, where `view` is no picture of it.
     frame: str = VIEW
@@ -186,13 +190,33 @@ class PlayedServer:
             return Response(STILL if self.view else self.frame, media_type="text/html")
         if path == "/viser/still.jpg":
             return Response(self.view, media_type="image/jpeg")
-        if path.startswith("/api/points/") and path.endswith("/picture"):
-            self.crops_fetched.append(request.target)
-            return Response(self.crop, media_type="image/jpeg") if self.crop else Response(status_code=204)
+        if path.startswith(("/api/points/", "/api/spurs/")) and path.endswith(("/drawing", "/picture")):
+            self.pictures_fetched.append(request.target)
+            drawn = self.drawing_of(path) if self.crop else None
+            if drawn is None:
+                return Response(status_code=204)
+            if path.endswith("/picture"):
+                return Response(self.crop, media_type="image/jpeg")
+            return Response(msgspec.json.encode(drawn), media_type="application/json")
         if path == "/camera/color.jpg":
             self.frames_fetched.append(int(request.target.split("n=")[1]))
             return Response(self.image, media_type="image/jpeg")
         return page_file({"/": "index.html", "/sign-in": "sign-in.html"}.get(path, path))
+
+    def drawing_of(self, path: str) -> SpurDrawing | None:
+        """What is drawn on the picture of a point or a spur; None where there is no such point."""
+        _, _, kind, *place, _ = path.split("/")
+        if kind == "spurs":
+            vine, spur = map(int, place)
+            return drawing(
+                vine, spur, *(row for row in self.points if (row.point.vine, row.point.spur) == (vine, spur))
+            )
+        for row in self.points:
+            if row.point.point_id == place[0]:
+                revision = self.drawn_revisions.get(place[0], row.point.revision)
+                drawn = msgspec.structs.replace(row.point, revision=revision)
+                return drawing(drawn.vine, drawn.spur, msgspec.structs.replace(row, point=drawn))
+        return None
 
     def accept(self, socket: PlayedSocket) -> bool:
         if self.online:

@@ -50,6 +50,7 @@ def test_clicks_on_canes_in_the_view_and_in_the_image_place_points(tmp_path: Pat
         page.wait_for_selector('[data-cut][data-state="PROPOSED"]', timeout=90_000)
         page.click('[data-tab="review"]')
         page.click("#add-by-hand")
+        page.click('[data-tab="work"]')
         page.wait_for_function("document.querySelector('rp-scene iframe').classList.contains('loaded')")
         robot.wait(lambda: len(blue_places(page)) > 50, 30, "the known canes to be drawn")
         places = blue_places(page)

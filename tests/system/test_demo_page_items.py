@@ -74,11 +74,20 @@ def entry(robot: LiveRobot, point_id: str) -> dict[str, Any]:
 
 
 def rows(page: Page, state: str) -> Locator:
-    return page.locator(f'rp-point[data-state="{state}"]')
+    return page.locator(f'.strip-mark[data-state="{state}"]')
 
 
 def row(page: Page, point_id: str) -> Locator:
-    return page.locator(f'rp-point[data-point-id="{point_id}"]')
+    return page.locator(f'.strip-mark[data-point-id="{point_id}"]')
+
+
+def look_at(page: Page, mark: Locator) -> str:
+    """Look at a point until it may be decided about; returns its name."""
+    name = str(mark.get_attribute("data-point-id"))
+    row(page, name).click()
+    expect(page.locator(f'rp-review[data-key="{name}"]:not([data-pictured="loading"])')).to_be_visible(timeout=LONG_MS)
+    page.wait_for_timeout(800)
+    return name
 
 
 def pressed(page: Page, button: Locator, until: Callable[[], object], robot: LiveRobot, what: str) -> None:
@@ -112,15 +121,17 @@ def decide(page: Page, robot: LiveRobot) -> None:
         page.click("#arm")
     expect(page.locator("#mode")).to_have_attribute("data-mode", "READY", timeout=LONG_MS)
     open_screen(page, "review")
-    name = str(rows(page, "PROPOSED").first.get_attribute("data-point-id"))
-    row(page, name).locator("button.reject").click()
+    name = look_at(page, rows(page, "PROPOSED").first)
+    page.click("#review-leave")
     page.get_by_role("button", name="wrong cane").click()
     expect(row(page, name)).to_have_attribute("data-state", "REJECTED", timeout=LONG_MS)
-    expect(row(page, name).locator(".reason").first).to_contain_text("wrong cane")
+    look_at(page, row(page, name))
+    expect(page.locator(".review-why")).to_contain_text("wrong cane")
     page.click("#undo")
     expect(row(page, name)).to_have_attribute("data-state", "PROPOSED", timeout=LONG_MS)
 
-    row(page, name).click()
+    look_at(page, row(page, name))
+    page.locator(".adjust summary").click()
     before = entry(robot, name)["point"]
 
     def told() -> list[str]:
@@ -148,7 +159,8 @@ def decide(page: Page, robot: LiveRobot) -> None:
     def more_accepted() -> bool:
         """As a person does: what is refused, since it is seen otherwise by now, is looked at and accepted again."""
         accepted = rows(page, "ACCEPTED").count()
-        rows(page, "PROPOSED").first.locator("button.accept").click()
+        look_at(page, rows(page, "PROPOSED").first)
+        page.click("#review-accept")
         for _ in range(30):
             page.wait_for_timeout(100)
             if rows(page, "ACCEPTED").count() > accepted:
@@ -192,7 +204,7 @@ def order_and_turn(page: Page, robot: LiveRobot) -> None:
     expect(page.locator("rp-order summary")).to_contain_text("by the plan", timeout=LONG_MS)
     page.locator("rp-order summary").click()
 
-    row(page, first).click()
+    look_at(page, row(page, first))
     page.get_by_label("Turn of the approach").fill("15")
     robot.wait(
         lambda: entry(robot, first)["entry"]["azimuth"] == pytest.approx(0.2618, abs=1e-3), 20, "the approach to turn"

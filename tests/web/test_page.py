@@ -2,7 +2,6 @@
 
 import json
 
-import msgspec
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
@@ -10,9 +9,9 @@ from rolling_panda import reasons
 from rolling_panda.messages import page as p
 from rolling_panda.reasons import text_of
 from tests.support.page_host import STAND_STILL
-from tests.support.page_parts import open_screen
+from tests.support.page_parts import choose, open_screen
 from tests.support.played_page import box_of, until
-from tests.support.played_server import ORIGIN, PlayedServer, bridge, controller, point
+from tests.support.played_server import ORIGIN, PlayedServer, bridge, controller
 
 pytestmark = pytest.mark.browser
 
@@ -20,68 +19,6 @@ pytestmark = pytest.mark.browser
 @pytest.fixture
 def screen() -> str:
     return "review"
-
-
-def test_shows_the_queue_by_vine_and_spur_and_selects(page: Page, server: PlayedServer) -> None:
-    expect(page.locator(".group h3")).to_have_text(["Vine 1 · spur 1", "Vine 1 · spur 2"])
-    row = page.locator('[data-point-id="p2"]')
-    expect(row).to_have_attribute("data-state", "ACCEPTED")
-    expect(row).to_contain_text("2/9 nodes · 8.0 mm · 87 %")
-    row.click()
-    until(page, lambda: p.Select(point_id="p2") in server.said)
-    expect(page.locator(".mark.selected")).to_have_attribute("data-state", "ACCEPTED")
-    server.tell(p.Selected(point_id="p3"))
-    expect(page.locator('[data-point-id="p3"]')).to_have_attribute("aria-current", "true")
-    page.locator("#swap").click()
-    page.locator(".mark").first.click()
-    until(page, lambda: p.Select(point_id="p1") in server.said)
-
-
-def test_accepts_and_rejects_with_buttons_and_keys(page: Page, server: PlayedServer) -> None:
-    page.locator('[data-point-id="p1"] button.accept').click()
-    until(page, lambda: ("/api/points/p1/accept", {"revision": 4, "digest": "00000001" * 4}) in server.posted)
-    expect(page.locator('[data-point-id="p3"] button.accept')).to_be_disabled()
-    page.locator('[data-point-id="p1"]').focus()
-    page.keyboard.press("ArrowDown")
-    page.keyboard.press("r")
-    page.keyboard.press("Enter")
-    until(page, lambda: ("/api/points/p2/reject", {"reason": ""}) in server.posted)
-
-
-def test_all_are_accepted_only_from_a_confidence_on_and_the_button_says_which_and_how_many(
-    page: Page, server: PlayedServer
-) -> None:
-    shares = (0.99, 0.8, 0.7999, 0.5)
-    server.points = tuple(sure(number, share) for number, share in enumerate(shares, 1))
-    server.tell(server.page_points())
-    every = page.locator("#accept-all")
-    expect(every).to_have_text("Accept all 2 (≥ 80 % sure)")
-    expect(every).to_have_attribute(
-        "title", "Accept every proposed point that is ≥ 80 % sure; 2 less sure: decide one by one"
-    )
-    expect(page.locator(".facts")).to_contain_text(["· 99 %", "· 80 %", "· only 79 %", "· only 50 %"])
-    every.click()
-    until(page, lambda: bool(server.posted))
-    assert server.posted == [("/api/points/accept-all", {"confidence": 0.8})]
-    expect(page.locator("rp-queue select")).to_have_count(0)
-    server.points = server.points[2:]
-    server.tell(server.page_points())
-    expect(every).to_be_disabled()
-    expect(every).to_have_attribute("title", text_of(reasons.none_so_confident(0.8)))
-
-
-def sure(number: int, share: float) -> p.PagePoint:
-    row = point(number, "PROPOSED", spur=number)
-    return msgspec.structs.replace(row, point=msgspec.structs.replace(row.point, confidence=share))
-
-
-def test_how_an_unknown_cut_ended_is_said_by_who_has_looked(page: Page, server: PlayedServer) -> None:
-    server.points = (point(6, "UNKNOWN"),)
-    server.tell(server.page_points())
-    row = page.locator('[data-point-id="p6"]')
-    row.get_by_role("button", name="I have looked: it is not cut p6").click()
-    answer = {"outcome": "FAILED_NOT_CUT", "reason": "seen by eye"}
-    until(page, lambda: ("/api/points/p6/resolve", answer) in server.posted)
 
 
 def test_only_what_the_controller_allows_is_enabled_and_the_rest_says_why(page: Page, server: PlayedServer) -> None:
@@ -106,7 +43,8 @@ def test_a_greyed_button_does_nothing_and_says_why_to_a_finger(page: Page, serve
     expect(page.locator(".next-why")).to_have_text(text_of(refused))
     start.click(force=True)
     expect(page.locator(".toast")).to_contain_text(text_of(refused))
-    page.locator('[data-point-id="p3"] button.accept').click(force=True)
+    choose(page, "p3")
+    page.locator("#review-accept").click(force=True)
     expect(page.locator(".toast").last).to_contain_text("p3 is Done")
     server.controller = controller("ESTOP_LATCHED")
     expect(page.locator("#reset")).to_have_attribute("aria-disabled", "true")
@@ -115,9 +53,8 @@ def test_a_greyed_button_does_nothing_and_says_why_to_a_finger(page: Page, serve
     assert server.posted == []
 
 
-def test_it_says_that_it_is_a_simulation_and_what_tells_wood_from_wire(page: Page, server: PlayedServer) -> None:
+def test_it_says_that_it_is_a_simulation(page: Page, server: PlayedServer) -> None:
     expect(page.locator("rp-camera .tag")).to_contain_text("simulation")
-    expect(page.locator("rp-queue .panel-head")).to_contain_text("simulator labels")
     server.bridge = bridge(kind="real")
     expect(page.locator("rp-camera .tag")).not_to_contain_text("simulation")
 
@@ -354,7 +291,7 @@ def test_a_lost_link_is_said_and_mended_by_itself(page: Page, server: PlayedServ
     server.sockets[-1].close()
     banner = page.locator("rp-link-banner")
     expect(banner).to_contain_text("No link to the server")
-    expect(page.locator('[data-point-id="p1"]')).to_be_visible()
+    expect(page.locator('.strip-mark[data-point-id="p1"]')).to_be_visible()
     expect(page.locator("#start")).to_be_disabled()
     server.online = True
     expect(banner).to_be_hidden(timeout=10000)
@@ -371,7 +308,7 @@ def test_says_what_it_waits_for_before_there_is_anything(tab: Page) -> None:
     server.attach(tab)
     tab.goto(f"{ORIGIN}/#review")
     expect(tab.locator("#mode")).to_have_text("No state yet")
-    expect(tab.locator("rp-queue > .empty")).to_contain_text("No pruning point in 12 images so far")
+    expect(tab.locator("rp-review > .empty")).to_contain_text("No pruning point in 12 images so far")
     expect(tab.locator("#start")).to_be_disabled()
     expect(tab.locator("#stop")).to_be_enabled()
 
@@ -398,12 +335,3 @@ def test_a_busy_page_does_not_take_its_own_pause_for_a_lost_link(page: Page, ser
 def test_a_silent_link_is_given_up_and_tried_again(page: Page, server: PlayedServer) -> None:
     server.silent = True
     until(page, lambda: len(server.sockets) > 1, seconds=10.0)
-
-
-def test_places_without_a_point_are_told_by_what_they_need(page: Page) -> None:
-    look, person = page.locator('[data-needs="another look"]'), page.locator('[data-needs="operator"]')
-    expect(look.locator("summary")).to_have_text("1 place needs another look")
-    expect(person.locator("summary")).to_have_text("1 place for you to decide")
-    person.locator("summary").click()
-    expect(person.locator("li")).to_have_text("Vine 1 · spur 4: " + reasons.text_of(reasons.wire_near_cut(6.0)))
-    expect(look.locator("li")).to_have_text("Vine 1 · spur 3: " + reasons.text_of(reasons.nodes_lacking(0, 2)))

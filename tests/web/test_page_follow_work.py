@@ -4,9 +4,10 @@ from typing import Any
 
 import msgspec
 import pytest
-from playwright.sync_api import Locator, Page, expect
+from playwright.sync_api import Page, expect
 
 from rolling_panda.messages import page as p
+from tests.support.page_parts import mark
 from tests.support.played_page import box_of, until
 from tests.support.played_server import PlayedServer, controller, point
 
@@ -33,21 +34,15 @@ def server() -> PlayedServer:
     )
 
 
-def row(page: Page, name: str) -> Locator:
-    return page.locator(f'rp-point[data-point-id="{name}"]')
-
-
 def in_view(page: Page, name: str) -> bool:
-    """Whether all of a row that fits is to be seen in the list."""
-    item, frame = box_of(row(page, name)), box_of(page.locator("rp-queue .groups"))
-    above = item["y"] >= frame["y"] - 1
-    below = item["y"] + item["height"] <= frame["y"] + frame["height"] + 1
-    return above and (below or item["height"] > frame["height"] - 25)
+    """Whether its sign is to be seen in the strip."""
+    item, frame = box_of(mark(page, name)), box_of(page.locator("rp-point-strip"))
+    return item["x"] >= frame["x"] - 1 and item["x"] + item["width"] <= frame["x"] + frame["width"] + 1
 
 
 def is_shown(page: Page, name: str) -> None:
-    expect(row(page, name)).to_have_attribute("aria-current", "true")
-    expect(row(page, name).locator("rp-point-details .crop")).to_have_class("crop loaded")
+    expect(mark(page, name)).to_have_attribute("aria-current", "true")
+    expect(page.locator(f'rp-review[data-key="{name}"][data-pictured="shown"]')).to_be_visible()
     until(page, lambda: in_view(page, name))
 
 
@@ -70,14 +65,14 @@ def test_choosing_in_the_picture_or_the_3d_view_brings_the_list_there(page: Page
     is_shown(page, "p7")
     assert chosen(server) == [("p50", False)]
     # Looked away from, and clicked again in the view: the list comes back.
-    page.locator("rp-queue .groups").evaluate("list => { list.scrollTop = list.scrollHeight; }")
+    page.locator("rp-point-strip").evaluate("strip => { strip.scrollLeft = strip.scrollWidth; }")
     until(page, lambda: not in_view(page, "p7"))
     server.tell(p.Selected(point_id="p7"))
     is_shown(page, "p7")
 
 
 def test_choosing_a_row_brings_the_view_and_pressing_it_again_once_more(page: Page, server: PlayedServer) -> None:
-    head = row(page, "p2").locator(".point-name")
+    head = mark(page, "p2")
     head.click()
     is_shown(page, "p2")
     until(page, lambda: chosen(server) == [("p2", False)])
@@ -85,16 +80,15 @@ def test_choosing_a_row_brings_the_view_and_pressing_it_again_once_more(page: Pa
     page.wait_for_function("at => performance.now() > at + 450", arg=page.evaluate("performance.now()"))
     head.click()
     until(page, lambda: chosen(server) == [("p2", False), ("p2", False)])
-    page.keyboard.press("End")
-    is_shown(page, f"p{MANY}")
+    page.keyboard.press("ArrowRight")
+    is_shown(page, "p3")
 
 
 def test_choosing_in_the_order_of_work_brings_the_queue_and_the_other_way_round(
     page: Page, server: PlayedServer
 ) -> None:
     page.locator("rp-order summary").click()
-    row(page, "p1").locator(".point-name").click()
-    page.keyboard.press("End")
+    mark(page, f"p{MANY}").click()
     expect(page.locator('.order-row[aria-selected="true"]')).to_have_attribute("data-point-id", f"p{MANY}")
     first = page.locator(".order-row").first
     name = first.get_attribute("data-point-id")
@@ -113,9 +107,9 @@ def test_at_work_list_and_picture_go_along_but_not_from_under_somebodys_hand(pag
     server.tell(p.Selected(point_id="p5"))
     is_shown(page, "p5")
     at_work(server, "p42")
-    expect(row(page, "p42")).to_have_class("active")
-    expect(row(page, "p5")).to_have_attribute("aria-current", "true")
-    expect(row(page, "p42")).to_have_attribute("aria-current", "true", timeout=15_000)
+    expect(mark(page, "p42")).to_have_class("strip-mark active")
+    expect(mark(page, "p5")).to_have_attribute("aria-current", "true")
+    expect(mark(page, "p42")).to_have_attribute("aria-current", "true", timeout=15_000)
     is_shown(page, "p42")
     assert chosen(server)[2:] == [("p42", True)]
 
@@ -124,5 +118,5 @@ def test_nobody_is_taken_along_while_nothing_is_cut_or_a_point_is_placed(page: P
     server.controller = controller("READY", active_point_id="")
     page.locator("#add-by-hand").click()
     at_work(server, "p40")
-    expect(row(page, "p40")).to_have_class("active")
+    expect(mark(page, "p40")).to_have_class("strip-mark active")
     assert chosen(server) == []

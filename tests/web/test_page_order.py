@@ -7,6 +7,7 @@ from playwright.sync_api import Page, expect
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.reasons import text_of
+from tests.support.page_parts import choose, mark
 from tests.support.played_page import box_of, until
 from tests.support.played_server import PlayedServer, controller, point
 
@@ -38,6 +39,7 @@ def shown(page: Page) -> list[str]:
 def opened(page: Page) -> None:
     page.locator("rp-order summary").click()
     expect(page.locator(".order-row").first).to_be_visible()
+    page.locator(".order-list").scroll_into_view_if_needed()
 
 
 def test_the_list_is_in_the_order_of_work_and_says_whose_it_is(page: Page, server: PlayedServer) -> None:
@@ -108,10 +110,10 @@ WATCH = """() => {
   new MutationObserver((records) => {
     for (const { target } of records) {
       const part = target instanceof Element ? target : target.parentElement;
-      const row = part?.closest("rp-point, .order-row");
-      if (row && !part.closest("rp-point-details")) window.touched.push(row.dataset.pointId);
+      const row = part?.closest(".strip-mark, .order-row");
+      if (row) window.touched.push(row.dataset.pointId);
     }
-  }).observe(document.querySelector("rp-queue"), {
+  }).observe(document.querySelector("rp-review"), {
     subtree: true, childList: true, attributes: true, characterData: true,
   });
 }"""
@@ -142,18 +144,20 @@ def test_of_many_points_only_those_in_view_are_there_and_only_what_changed_is_dr
     assert touched(page) == set(), "states and points that are as they were"
     page.keyboard.press("ArrowUp")
     expect(page.locator('.order-row[data-point-id="p298"]')).to_have_attribute("aria-selected", "true")
-    # Of the queue the first row takes the Tab key while no row is chosen.
     assert touched(page) <= {"p298", "p299", "p0"}
-    entry = msgspec.structs.replace(server.points[297].entry, reason=reasons.said("a wire is near"))
+    entry = msgspec.structs.replace(server.points[297].entry, state="UNREACHABLE")
     changed = msgspec.structs.replace(server.points[297], entry=entry)
     server.points = (*server.points[:297], changed, *server.points[298:])
     server.tell(server.page_points())
-    expect(page.locator('rp-point[data-point-id="p297"] .reason')).to_contain_text("a wire is near")
-    assert touched(page) == {"p297"}
+    expect(mark(page, "p297")).to_have_attribute("data-status", "unreachable")
+    # Of the order of work, where it is no longer, the rows in view have moved up.
+    changed_ones = touched(page)
+    assert "p297" in changed_ones and len(changed_ones) < 30
 
 
 def test_the_approach_is_turned_and_left_to_the_search_again(page: Page, server: PlayedServer) -> None:
-    page.locator('rp-point[data-point-id="p2"]').click()
+    choose(page, "p2")
+    page.locator(".adjust summary").click()
     page.get_by_label("Turn of the approach").fill("30")
     until(page, lambda: bool(server.posted))
     path, body = server.posted[0]

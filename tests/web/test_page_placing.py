@@ -7,18 +7,18 @@ from playwright.sync_api import Page, expect
 from rolling_panda import reasons
 from rolling_panda.messages import page as p
 from server.api.responses import outcome
+from tests.support.page_parts import open_screen
 from tests.support.played_page import until
 from tests.support.played_server import PlayedServer, point
 
 pytestmark = pytest.mark.browser
-
-
-@pytest.fixture
-def screen() -> str:
-    return "review"
-
-
 PLACED = (200, outcome(True, reasons.point_placed("p9")))
+
+
+def place_by_hand(page: Page) -> None:
+    open_screen(page, "review")
+    page.locator("#add-by-hand").click()
+    open_screen(page, "work")
 
 
 def click_image(page: Page, u: float, v: float) -> None:
@@ -37,9 +37,9 @@ def test_a_click_into_the_view_asks_for_a_point_only_while_points_are_placed(pag
     # A later message, whose arrival can be seen: the click has come too.
     server.points = server.points[:2]
     server.tell(server.page_points())
-    expect(page.locator("rp-point")).to_have_count(2)
+    expect(page.locator("[data-cut]")).to_have_count(2)
     expect(page.locator("rp-placing")).to_be_hidden()
-    page.locator("#add-by-hand").click()
+    place_by_hand(page)
     until(page, lambda: p.PlaceByHand(active=True) in server.said)
     expect(page.locator("rp-placing")).to_contain_text("Click a cane that has been seen")
     assert server.posted == []
@@ -59,7 +59,7 @@ def test_a_click_into_the_camera_image_says_which_frame_and_where(page: Page, se
     click_image(page, 0.25, 0.8)
     page.wait_for_timeout(200)
     assert server.posted == [], "a click means nothing before points are placed"
-    page.locator("#add-by-hand").click()
+    place_by_hand(page)
     click_image(page, 0.25, 0.8)
     until(page, lambda: bool(server.posted))
     path, body = server.posted[0]
@@ -71,11 +71,12 @@ def test_a_click_into_the_camera_image_says_which_frame_and_where(page: Page, se
 def test_where_no_point_can_be_the_page_says_why(page: Page, server: PlayedServer) -> None:
     refusal = "no known cane within 25 mm of there; click on a cane that is drawn"
     server.answers["/api/points/by-hand"] = (409, {"ok": False, "reason": refusal})
-    page.locator("#add-by-hand").click()
+    place_by_hand(page)
     server.tell(p.PickRay(origin=(0.0, -0.5, 1.2), direction=(0.0, 1.0, 0.0)))
     expect(page.locator(".toast")).to_contain_text(refusal)
     server.role = "viewer"
     expect(page.locator("rp-placing")).to_be_hidden()
+    open_screen(page, "review")
     expect(page.locator("#add-by-hand")).to_be_disabled()
 
 
@@ -97,10 +98,12 @@ def test_a_frozen_image_stays_with_its_points_and_is_the_one_that_is_clicked(pag
     page.wait_for_timeout(1500)
     assert len(server.frames_fetched) == count
     assert page.locator("rp-camera img").get_attribute("src") == shown
-    page.locator("#add-by-hand").click()
+    place_by_hand(page)
     click_image(page, 0.5, 0.75)
     expect(page.locator("rp-camera .mark")).to_have_count(2)
     assert server.posted[0][1]["sequence"] == int(shown.split("n=")[1])
+    page.keyboard.press("Escape")
+    expect(page.locator("rp-placing")).to_be_hidden()
     page.locator("#freeze").click()
     until(page, lambda: len(server.frames_fetched) > count)
     expect(page.locator("rp-camera .mark").first).to_have_attribute("transform", "translate(9.0 9.0)")

@@ -1,4 +1,4 @@
-"""What the page tells of a chosen point, and the pruning rule that is tried on it."""
+"""The pruning rule: what another one would change, applied, and undone."""
 
 import msgspec
 import pytest
@@ -6,6 +6,7 @@ from playwright.sync_api import Page, expect
 
 from rolling_panda import messages as m
 from rolling_panda import reasons
+from tests.support.page_parts import choose, mark
 from tests.support.played_page import until
 from tests.support.played_server import PlayedServer
 
@@ -15,43 +16,6 @@ pytestmark = pytest.mark.browser
 @pytest.fixture
 def screen() -> str:
     return "review"
-
-
-def test_the_chosen_point_shows_its_picture_and_what_is_behind_the_cut(page: Page, server: PlayedServer) -> None:
-    expect(page.locator("rp-point-details")).to_have_count(0)
-    page.locator('[data-point-id="p1"]').click()
-    details = page.locator('[data-point-id="p1"] rp-point-details')
-    expect(details.locator(".crop")).to_have_class("crop loaded")
-    assert server.crops_fetched[-1].startswith("/api/points/p1/picture?of=00000001")
-    for words in (
-        "Spur cut, 20 mm past node 2",
-        "8.0 mm, ≈ 470 N",
-        "± 3.0 mm, ± 2°",
-        "wire 141 · cordon 62 · node 21 mm",
-    ):
-        expect(details).to_contain_text(words)
-    count = len(server.crops_fetched)
-    page.locator('[data-point-id="p3"]').click()
-    expect(page.locator("rp-point-details")).to_have_count(1)
-    until(page, lambda: len(server.crops_fetched) == count + 1)
-
-
-def test_a_picture_is_fetched_once_a_revision_and_again_until_it_has_come(page: Page, server: PlayedServer) -> None:
-    server.crop = b""
-    page.locator('[data-point-id="p1"]').click()
-    crop = page.locator("rp-point-details .crop")
-    until(page, lambda: len(server.crops_fetched) == 1)
-    expect(crop).to_have_class("crop")
-    server.crop = PlayedServer().crop
-    expect(crop).to_have_class("crop loaded")
-    for _ in range(3):
-        server.tell(server.page_points())
-    page.wait_for_timeout(300)
-    assert len(server.crops_fetched) == 2
-    first = msgspec.structs.replace(server.points[0].point, revision=5, digest="ab" * 16)
-    server.points = (msgspec.structs.replace(server.points[0], point=first), *server.points[1:])
-    server.tell(server.page_points())
-    until(page, lambda: server.crops_fetched[-1].startswith("/api/points/p1/picture?of=abab"))
 
 
 ASKED = {"system": "spur", "nodes_kept": 2, "fruiting_nodes": 8, "preferred_diameter": 0.006, "offset": 0.025}
@@ -103,7 +67,7 @@ def test_an_applied_rule_is_taken_back_with_its_acceptances_by_undo(page: Page, 
         third,
     )
     server.tell(server.page_points())
-    expect(page.locator('[data-point-id="p2"] .reason')).to_contain_text("The rule is now: Spur, nodes kept: 2")
+    expect(choose(page, "p2").locator(".review-why")).to_contain_text("The rule is now: Spur, nodes kept: 2")
     expect(page.locator("rp-rule summary")).to_have_text("Spur · 2 nodes · ≥ 6 mm · 25 mm past")
     expect(page.locator("#rule-apply")).to_be_hidden()
     undo = page.locator("#undo")
@@ -113,7 +77,7 @@ def test_an_applied_rule_is_taken_back_with_its_acceptances_by_undo(page: Page, 
     server.rule, server.points = m.PruningRule(), (first, second, third)
     server.tell(server.page_points())
     expect(page.locator("#rule-offset")).to_have_value("20")
-    expect(page.locator('[data-point-id="p2"]')).to_have_attribute("data-state", "ACCEPTED")
+    expect(mark(page, "p2")).to_have_attribute("data-state", "ACCEPTED")
     expect(undo).to_be_disabled()
 
 

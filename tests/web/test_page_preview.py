@@ -61,7 +61,7 @@ def test_a_preview_is_asked_for_of_all_or_of_the_chosen_point(page: Page, server
     page.locator("#preview").click()
     until(page, lambda: server.posted[1:] == [("/api/preview", {"point_id": ""})])
     expect(page.locator("#preview-one")).to_have_attribute("title", text_of(reasons.none_chosen()))
-    page.locator('rp-point[data-point-id="p2"]').click()
+    page.locator('.strip-mark[data-point-id="p2"]').click()
     page.locator("#preview-one").click()
     until(page, lambda: ("/api/preview", {"point_id": "p2"}) in server.posted)
 

@@ -13,7 +13,7 @@ from rolling_panda.messages import Reason
 from server.robots.summary import RobotSummary
 from tests.support.axe import axe, grave
 from tests.support.page_host import PlayedRequest, PlayedSocket, page_host
-from tests.support.page_parts import open_screen
+from tests.support.page_parts import choose, open_screen
 from tests.support.played_page import opened, until
 from tests.support.played_server import ORIGIN, PlayedServer, controller, page_file, point
 
@@ -124,8 +124,7 @@ def test_the_other_robot_is_seen_and_chosen_and_nothing_reaches_the_wrong_one(pa
     assert min(samples(page)) >= 0, "the other robot's readings are no readings of this one"
     page.keyboard.up("KeyH")
     # What is pressed now is for the robot that is shown, except the stop.
-    open_screen(page, "review")
-    page.locator('[data-point-id="p2"]').click()
+    choose(page, "p2")
     page.keyboard.press("KeyA")
     until(page, lambda: any(path == "/api/points/p2/accept" for path, _ in two.posted))
     assert one.posted == []

@@ -38,9 +38,10 @@ COVERED = """over => [...document.querySelectorAll("button, select, input, summa
 })"""
 #: Words that are cut off.
 CUT = "all => all.filter(each => each.scrollWidth > each.clientWidth + 1).map(each => each.outerHTML.slice(0, 120))"
-#: What scrolls sideways, other than tables.
+#: What scrolls sideways, other than tables, and the strip of all cuts, which is made for it.
 SIDEWAYS = """() => [...document.querySelectorAll("main, main *")].filter(each => each.checkVisibility() &&
   ["auto", "scroll"].includes(getComputedStyle(each).overflowX) && !each.querySelector("table") &&
+  each.localName !== "rp-point-strip" &&
   each.scrollWidth > each.clientWidth + 1).map(each => each.localName + "." + each.className)"""
 TO_THE_END = "() => { for (const each of [document.documentElement, document.body]) each.scrollTo(0, 1e6); }"
 TO_THE_TOP = "() => { for (const each of [document.documentElement, document.body]) each.scrollTo(0, 0); }"

@@ -6,7 +6,7 @@ from playwright.sync_api import Page, expect
 
 from rolling_panda import reasons
 from rolling_panda.reasons import text_of
-from tests.support.page_parts import open_screen
+from tests.support.page_parts import choose, open_screen
 from tests.support.played_page import until
 from tests.support.played_server import PlayedServer, controller
 
@@ -26,24 +26,19 @@ def test_a_survey_goes_as_far_as_was_chosen(page: Page, server: PlayedServer) ->
     assert server.posted == [("/api/survey", {"distance": 4}), ("/api/survey", {"distance": 15})]
 
 
-def test_a_place_that_needs_another_look_has_a_button_for_it_and_one_for_a_person_has_none(
-    page: Page, server: PlayedServer
-) -> None:
-    open_screen(page, "review")
-    server.controller = controller("READY", allowed={"Survey": None})
+def test_another_look_is_asked_for_only_where_a_place_is_known(page: Page, server: PlayedServer) -> None:
+    server.controller = controller("READY", allowed={"LookAgain": None})
     unclear, deciding = server.undecided_sites
     server.undecided_sites = (msgspec.structs.replace(unclear, position=(1.0, 0.8, 0.9)), deciding)
     server.tell(server.page_points())
-    for box in page.locator("details.undecided-sites").all():
-        box.locator("summary").click()
-    button = page.locator("button.look-again")
-    expect(button).to_have_count(1)
-    expect(page.locator("li", has=button)).to_contain_text("Vine 1 · spur 3")
-    button.click()
+    choose(page, "place-1-4")
+    expect(page.locator("#look-again")).to_be_hidden()
+    choose(page, "place-1-3")
+    page.locator("#look-again").click()
     until(page, lambda: bool(server.posted))
     assert server.posted == [("/api/look-again", {"vine": 1, "spur": 3})]
     server.controller = controller("AUTO", allowed={"Pause": None})
-    expect(button).to_be_disabled()
+    expect(page.locator("#look-again")).to_be_disabled()
 
 
 def test_an_unfamiliar_picture_is_told_to_the_operator(page: Page, server: PlayedServer) -> None:
@@ -53,8 +48,7 @@ def test_an_unfamiliar_picture_is_told_to_the_operator(page: Page, server: Playe
     told = msgspec.structs.replace(site, reason=reason, needs="operator", vine=0, spur=0, position=None)
     server.undecided_sites = (told,)
     server.tell(server.page_points())
-    box = page.locator("details.undecided-sites[data-needs='operator']")
-    box.locator("summary").click()
-    expect(box.locator("li")).to_contain_text(text_of(reason))
-    expect(box.locator("li")).to_contain_text("decide yourself where to cut")
-    expect(page.locator("button.look-again")).to_have_count(0)
+    notes = page.locator(".review-notes")
+    expect(notes).to_contain_text(text_of(reason))
+    expect(notes).to_contain_text("decide yourself where to cut")
+    expect(page.locator('.strip-mark[data-status="decide"]')).to_have_count(0)

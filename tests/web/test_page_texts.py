@@ -35,7 +35,7 @@ WEB = resource("web/index.html").parent
 TEXTS: dict[str, str] = json.loads((WEB / "text" / "page.en.json").read_text(encoding="utf-8"))
 #: Commands with a button of their own.
 BUTTONS = ("Arm", "Survey", "Start", "Pause", "Resume", "Home", "Acknowledge")
-FACTS = ("cut", "keeps", "cane", "place", "clear", "content")
+FACTS = ("cut", "keeps", "sure", "cane", "place", "clear")
 READINGS = re.findall(r'\bid: "([\w-]+)"', (WEB / "js" / "views" / "readings.js").read_text(encoding="utf-8"))
 COLUMNS = (
     *("vine", "done", "not_cut", "unknown", "unreachable", "minutes", "when", "who", "asked", "why", "what", "mean"),
@@ -93,6 +93,9 @@ FAMILIES: dict[str, Sequence[str]] = {
     "details.${}.hint": FACTS,
     "details.kind.${}": get_args(types.CutKind),
     "details.near.${}": ("wire", "cordon", "node"),
+    "review.${}": ("sure", "fairly", "unsure"),
+    "review.place.${}": ("decide", "left"),
+    "plan.stands.${}.${}": ("left.ahead", "left.behind", "right.ahead", "right.behind"),
     "layer.${}": get_args(page_messages.Layer),
     "preset.${}": get_args(page_messages.CameraPreset),
     "preset.${}.hint": get_args(page_messages.CameraPreset),
@@ -193,7 +196,7 @@ SHOWN = re.compile(
 #: What is compared, styled or looked up instead of being shown.
 UNSEEN = re.compile(
     r"(?:class: |[!=]== |case |whyNot\(|querySelector(?:All)?\(|closest\??\.?\(|translate = |headers\.get\(|data: \{ |"
-    r'undecidedList\(|-controls": |name: |const PARTS = |const DISABLED = |getAttribute\()$'
+    r'-controls": |name: |const PARTS = |const DISABLED = |getAttribute\()$'
 )
 PROPER = {"Rolling Panda", "\0 · Rolling Panda", "\0 min \0 s", "\0 min", "\0 s", "\0 mm", "\0 / \0 s"}
 KEYS = {"H", "Esc", "Escape", "Tab", "Enter", "Space", "Arrow"}

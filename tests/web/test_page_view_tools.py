@@ -6,15 +6,11 @@ from playwright.sync_api import Page, expect
 from rolling_panda import reasons
 from rolling_panda.messages import page as p
 from rolling_panda.reasons import text_of
+from tests.support.page_parts import open_screen
 from tests.support.played_page import box_of, until
 from tests.support.played_server import PlayedServer
 
 pytestmark = pytest.mark.browser
-
-
-@pytest.fixture
-def screen() -> str:
-    return "review"
 
 
 def presets(server: PlayedServer) -> list[str]:
@@ -31,7 +27,7 @@ def test_the_camera_is_placed_by_buttons_and_by_keys_also_inside_the_view(page: 
     page.locator("h1").click()
     page.keyboard.press("2")
     until(page, lambda: presets(server)[1:] == ["row"])
-    page.locator("#add-by-hand").focus()
+    page.locator("#start").focus()
     page.frame_locator("rp-scene iframe").locator("#root").click()
     page.keyboard.press("3")
     until(page, lambda: presets(server)[2:] == ["tool"])
@@ -70,8 +66,10 @@ def test_two_clicks_are_measured_and_said_and_escape_ends_it(page: Page, server:
 def test_points_are_placed_or_places_measured_never_both(page: Page, server: PlayedServer) -> None:
     page.locator("#measure").click()
     until(page, lambda: p.Measure(active=True) in server.said)
+    open_screen(page, "review")
     page.locator("#add-by-hand").click()
     until(page, lambda: p.Measure(active=False) in server.said)
+    open_screen(page, "work")
     expect(page.locator("rp-view-tools")).to_be_hidden()
 
 

@@ -10,7 +10,11 @@ import { reason, saidText } from "../state/reasons.js";
 
 /** @typedef {import("../link/messages.js").PagePoint} PagePoint */
 /** @typedef {import("../link/messages.js").PointState} PointState */
-/** @typedef {{ words: string, undo: () => Promise<boolean> }} Decision */
+/**
+ * `about` is the key of the point or place that it was about; empty for several.
+ *
+ * @typedef {{ words: string, undo: () => Promise<boolean>, about: string }} Decision
+ */
 
 /** Depth of the undo stack. */
 const MOST = 100;
@@ -52,7 +56,7 @@ export function whyNotReject(row) {
 export async function accept(row) {
   if (isUnknown(row)) return resolve(row, "DONE", "seen by eye");
   const done = await send(row, "accepting", "accept", { revision: row.point.revision, digest: row.point.digest });
-  if (done) pushUndo(text("undo.accepting", { point: row.point.point_id }), () => restore(row));
+  if (done) pushUndo(text("undo.accepting", { point: nameOf(row) }), () => restore(row), row.point.point_id);
   return done;
 }
 
@@ -63,8 +67,23 @@ export async function accept(row) {
 export async function reject(row, reason) {
   if (isUnknown(row)) return resolve(row, "FAILED_NOT_CUT", reason || "seen by eye");
   const done = await send(row, "rejecting", "reject", { reason });
-  if (done) pushUndo(text("undo.rejecting", { point: row.point.point_id }), () => restore(row));
+  if (done) pushUndo(text("undo.rejecting", { point: nameOf(row) }), () => restore(row), row.point.point_id);
   return done;
+}
+
+/**
+ * Say why a point was left, after it was.
+ *
+ * @param {PagePoint} row
+ * @param {string} reason
+ */
+export function explain(row, reason) {
+  return send(row, "rejecting", "reject", { reason });
+}
+
+/** What a person calls a point. @param {PagePoint} row */
+export function nameOf({ point }) {
+  return text("point.name", { vine: point.vine, spur: point.spur });
 }
 
 /**
@@ -112,8 +131,8 @@ export function whyNotMove(row) {
  */
 export async function move(row, millimetres) {
   const done = await send(row, "moving", "move", { along: millimetres / 1000 });
-  const words = text("undo.moving", { point: row.point.point_id, distance: millimetres });
-  if (done) pushUndo(words, () => send(row, "moving_back", "move", { along: -millimetres / 1000 }));
+  const words = text("undo.moving", { point: nameOf(row), distance: millimetres });
+  if (done) pushUndo(words, () => send(row, "moving_back", "move", { along: -millimetres / 1000 }), row.point.point_id);
   return done;
 }
 
@@ -144,9 +163,10 @@ export function whyNoUndo() {
 /**
  * @param {string} words
  * @param {() => Promise<boolean>} back
+ * @param {string} [about] Key of the one point or place that it is about.
  */
-export function pushUndo(words, back) {
-  decisions.set([...decisions.get(), { words, undo: back }].slice(-MOST));
+export function pushUndo(words, back, about = "") {
+  decisions.set([...decisions.get(), { words, undo: back, about }].slice(-MOST));
 }
 
 /**
@@ -179,8 +199,7 @@ function resolve(row, outcome, reason) {
  * @param {object} body
  */
 function send(row, what, action, body) {
-  const name = row.point.point_id;
-  return ask(text(`decision.${what}`, { point: name }), `api/points/${encodeURIComponent(name)}/${action}`, body);
+  return ask(text(`decision.${what}`, { point: nameOf(row) }), `api/points/${encodeURIComponent(row.point.point_id)}/${action}`, body);
 }
 
 /** @param {PagePoint} row */

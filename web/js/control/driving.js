@@ -66,7 +66,7 @@ export function listenForDriveKeys(target) {
     "keydown",
     (event) => {
       if (!(event.code in KEYS) || event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target)) return;
-      const elsewhere = /** @type {Partial<Element>} */ (event.target).closest?.("input, select, rp-queue");
+      const elsewhere = /** @type {Partial<Element>} */ (event.target).closest?.("input, select, rp-review");
       if (!teleoperating.get() || moving.get() !== "base" || elsewhere) return;
       // Keeps the 3-D camera and the page's scroll where they are.
       event.preventDefault();

@@ -9,7 +9,7 @@ import { measuring } from "./view-tools.js";
 /** No following for this time after an interaction (ms). */
 const HOLD_OFF_MS = 8000;
 /** Where pointer, keys or wheel count as an interaction, so that no row moves from under a press. */
-const PARTS = "rp-queue, rp-order, rp-camera, rp-work";
+const PARTS = "rp-review, rp-order, rp-camera, rp-work";
 
 export function followWork() {
   for (const kind of ["pointerdown", "pointermove", "keydown", "wheel"]) {

@@ -5,6 +5,7 @@ import { durationWords } from "../state/format.js";
 import { pageState, points } from "../state/page-state.js";
 import { counted, text } from "../state/texts.js";
 import { countOf, whyNot, whyNotPoint } from "./allowed.js";
+import { nameOf, pushUndo } from "./decisions.js";
 
 /** @typedef {import("../link/messages.js").PagePoint} PagePoint */
 /** @typedef {import("../link/messages.js").PointPlan} PointPlan */
@@ -77,7 +78,11 @@ export function whyNotTurn(row) {
  * @param {PagePoint} row
  * @param {number|null} azimuth About the cane (rad); null leaves it to the search.
  */
-export function turnApproach(row, azimuth) {
+export async function turnApproach(row, azimuth) {
   const name = row.point.point_id;
-  return ask(text("order.turning", { point: name }), `api/points/${encodeURIComponent(name)}/approach`, { azimuth });
+  const turn = (/** @type {number|null} */ to) =>
+    ask(text("order.turning", { point: nameOf(row) }), `api/points/${encodeURIComponent(name)}/approach`, { azimuth: to });
+  const done = await turn(azimuth);
+  if (done) pushUndo(text("undo.turning", { point: nameOf(row) }), () => turn(row.entry.azimuth), name);
+  return done;
 }

@@ -1,12 +1,13 @@
 // Placing a point by hand: a click in the 3-D view or the camera image goes to the nearest known cane.
 
-import { post } from "../link/api.js";
+import { ask, post } from "../link/api.js";
 import { socket } from "../link/socket.js";
 import { link, pageState, say, showToast } from "../state/page-state.js";
 import { reasonText } from "../state/reasons.js";
 import { signal } from "../state/signals.js";
 import { text } from "../state/texts.js";
 import { whyNothingOf } from "./allowed.js";
+import { pushUndo } from "./decisions.js";
 import { select } from "./selection.js";
 
 /** Do clicks place points? */
@@ -35,6 +36,7 @@ export async function placePoint(path, body) {
   const answer = await post(path, body);
   if (answer.ok) {
     const point = String(answer.why?.values.find(([name]) => name === "point")?.[1] ?? "");
+    pushUndo(text("undo.placing"), () => unplace(point), point);
     select(point);
     showToast("info", reasonText(answer.why));
     return point;
@@ -43,6 +45,11 @@ export async function placePoint(path, body) {
   if (answer.status === 409) showToast("warning", words);
   else say("error", words);
   return "";
+}
+
+/** A point is never forgotten: one that was placed by mistake is rejected. @param {string} point */
+function unplace(point) {
+  return ask(text("undo.placing"), `api/points/${encodeURIComponent(point)}/reject`, { reason: text("undo.placed_reason") });
 }
 
 /** Handle clicks in the 3-D view; stop placing without a link or permission. */

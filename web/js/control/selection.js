@@ -7,6 +7,8 @@ import { revealCount, selected } from "../state/page-state.js";
 let interactedAt = -Infinity;
 /** Time of the last selection sent (ms). */
 let sentAt = -Infinity;
+/** Did the page select the newest point by itself? */
+let followed = false;
 /** A press both focuses a row and clicks it: within this time it is one selection (ms). */
 const ONE_PRESS_MS = 400;
 
@@ -44,6 +46,7 @@ export function selectAndReveal(pointId) {
  * @param {string} pointId
  */
 export function followPoint(pointId) {
+  followed = true;
   selected.set(pointId);
   socket.send({ type: "Select", point_id: pointId, follow: true });
 }
@@ -60,8 +63,14 @@ function send(pointId) {
   socket.send({ type: "Select", point_id: pointId });
 }
 
+/** Was the newest point selected by `followPoint`? */
+export function isFollowed() {
+  return followed;
+}
+
 /** @param {string} pointId */
 function show(pointId) {
+  followed = false;
   if (pointId === selected.get()) revealCount.set(revealCount.get() + 1);
   else selected.set(pointId);
 }

@@ -1,4 +1,4 @@
-// Details of the selected point: its image crop, figures, and adjustment of cut and approach.
+// What can be changed about a point: the cut along its cane, from where the blades come; and the figures behind it.
 
 import { move, whyNotMove } from "../js/control/decisions.js";
 import { turnApproach, whyNotTurn } from "../js/control/order.js";
@@ -10,9 +10,6 @@ import { element, setEnabled, setText } from "../js/views/dom.js";
 /** @typedef {import("../js/link/messages.js").PagePoint} PagePoint */
 /** @typedef {import("../js/link/messages.js").PruningPoint} PruningPoint */
 
-/** A missing crop is requested again after this time (ms), this many times. */
-const AGAIN_MS = 1500;
-const TRIES = 20;
 /** Debounce of the slider (ms). */
 const SETTLE_MS = 150;
 /** Steps along the cane (mm). */
@@ -22,10 +19,10 @@ const STEPS = Object.freeze([-5, -1, 1, 5]);
 const FACTS = Object.freeze([
   ["cut", cutWords],
   ["keeps", (point) => text("details.nodes", { kept: point.nodes_kept, seen: point.nodes_seen })],
+  ["sure", (point) => `${Math.floor(100 * point.confidence + 1e-9)} %`],
   ["cane", caneWords],
   ["place", placeWords],
   ["clear", clearWords],
-  ["content", (point) => `${point.revision} · ${point.digest.slice(0, 8) || "–"}`],
 ]);
 
 /** @param {PruningPoint} point */
@@ -62,68 +59,44 @@ function clearWords(point) {
   return `${distances.join(" · ")} mm`;
 }
 
-export class RpPointDetails extends HTMLElement {
+export class RpAdjust extends HTMLElement {
   constructor() {
     super();
-    this.picture = element("img", { attributes: { alt: text("details.crop") } });
-    this.frame = element("figure", { class: "crop" }, this.picture);
-    this.facts = element("dl", { class: "number" });
-    this.values = FACTS.map(() => element("dd"));
-    this.moves = element("div", { class: "moves", attributes: { role: "group", "aria-label": text("details.move_label") } });
     /** @type {PagePoint|null} */
     this.row = null;
+    this.values = FACTS.map(() => element("dd"));
     this.buttons = STEPS.map((step) => {
       const words = `${step > 0 ? "+" : "−"}${Math.abs(step)}`;
-      return element("button", { class: "quiet", text: words, onclick: () => this.move(step) });
+      return element("button", { text: words, onclick: () => this.row && void move(this.row, step) });
     });
-    this.moves.append(element("span", { text: text("details.move") }), ...this.buttons);
-    this.turn = element("input", {
-      attributes: {
-        type: "range",
-        min: "-75",
-        max: "75",
-        step: "5",
-        "aria-label": text("details.turn"),
-      },
-    });
+    const turn = { type: "range", min: "-75", max: "75", step: "5", "aria-label": text("details.turn") };
+    this.turn = element("input", { attributes: turn });
     this.turned = element("span", { class: "number" });
     this.free = element("button", {
-      class: "quiet",
       text: text("details.as_found"),
       onclick: () => this.row && void turnApproach(this.row, null),
     });
     this.turning = 0;
-    this.turn.addEventListener("input", () => this.turnTo(Number(this.turn.value)));
-    this.approach = element(
-      "div",
-      { class: "approach" },
-      element("span", { text: text("details.approach") }),
-      this.turn,
-      this.turned,
-      this.free,
-    );
-    this.shown = "";
-    this.tries = 0;
-    this.timer = 0;
   }
 
   connectedCallback() {
     if (this.childElementCount > 0) return;
-    FACTS.forEach(([name], at) => {
+    this.turn.addEventListener("input", () => this.turnTo(Number(this.turn.value)));
+    const facts = FACTS.map(([name], at) => {
       const [term, title] = [element("dt", { text: text(`details.${name}`) }), text(`details.${name}.hint`)];
-      this.facts.append(element("div", { attributes: { title } }, term, this.values[at] ?? ""));
+      return element("div", { attributes: { title } }, term, this.values[at] ?? "");
     });
-    this.picture.addEventListener("load", () => this.frame.classList.add("loaded"));
-    this.picture.addEventListener("error", () => {
-      if (this.tries++ >= TRIES) return;
-      this.timer = window.setTimeout(() => this.fetch(), AGAIN_MS);
-    });
-    this.append(this.frame, this.facts, this.moves, this.approach);
-  }
-
-  /** @param {number} step */
-  move(step) {
-    if (this.row) void move(this.row, step);
+    const moves = { role: "group", "aria-label": text("details.move_label") };
+    this.append(
+      element(
+        "details",
+        { class: "adjust" },
+        element("summary", { text: text("review.adjust") }),
+        element("div", { class: "moves", attributes: moves }, element("span", { text: text("details.move") }), ...this.buttons),
+        element("div", { class: "approach" }, element("span", { text: text("details.approach") }), this.turn, this.turned, this.free),
+        element("dl", { class: "number" }, ...facts),
+      ),
+    );
   }
 
   /** Debounced while the slider is dragged. @param {number} degrees */
@@ -138,26 +111,8 @@ export class RpPointDetails extends HTMLElement {
   }
 
   /** @param {PagePoint} row */
-  showApproach(row) {
-    const { azimuth } = row.entry;
-    const why = whyNotTurn(row);
-    setEnabled(this.turn, why, text("details.turn_hint"));
-    setEnabled(
-      this.free,
-      why ?? (azimuth === null ? reason("approach_free") : null),
-      text("details.as_found_hint"),
-    );
-    if (this.turning) return;
-    const degrees = azimuth === null ? 0 : Math.round((180 * azimuth) / Math.PI);
-    this.turn.value = String(degrees);
-    setText(this.turned, azimuth === null ? text("details.found") : `${degrees}°`);
-  }
-
-  /** @param {PagePoint} row */
   show(row) {
     this.row = row;
-    this.showApproach(row);
-    const { point } = row;
     const why = whyNotMove(row);
     this.buttons.forEach((button, at) => {
       const step = STEPS[at] ?? 0;
@@ -165,20 +120,16 @@ export class RpPointDetails extends HTMLElement {
     });
     FACTS.forEach(([, value], at) => {
       const node = this.values[at];
-      if (node) setText(node, value(point));
+      if (node) setText(node, value(row.point));
     });
-    // A restarted perception reuses ids: the hash distinguishes the points.
-    const path = `api/points/${encodeURIComponent(point.point_id)}/picture?of=${point.digest}`;
-    if (path === this.shown) return;
-    this.shown = path;
-    this.tries = 0;
-    window.clearTimeout(this.timer);
-    this.frame.classList.remove("loaded");
-    this.fetch();
-  }
-
-  fetch() {
-    this.picture.src = this.tries === 0 ? this.shown : `${this.shown}&try=${this.tries}`;
+    const { azimuth } = row.entry;
+    const whyNot = whyNotTurn(row);
+    setEnabled(this.turn, whyNot, text("details.turn_hint"));
+    setEnabled(this.free, whyNot ?? (azimuth === null ? reason("approach_free") : null), text("details.as_found_hint"));
+    if (this.turning) return;
+    const degrees = azimuth === null ? 0 : Math.round((180 * azimuth) / Math.PI);
+    this.turn.value = String(degrees);
+    setText(this.turned, azimuth === null ? text("details.found") : `${degrees}°`);
   }
 }
-customElements.define("rp-point-details", RpPointDetails);
+customElements.define("rp-adjust", RpAdjust);

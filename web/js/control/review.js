@@ -1,0 +1,183 @@
+// The sequence in which a person decides: the points and the undecided places along the row, one at a time.
+
+import { points, selected } from "../state/page-state.js";
+import { signal } from "../state/signals.js";
+import { text } from "../state/texts.js";
+import { statusOf } from "../views/point-status.js";
+import { pushUndo } from "./decisions.js";
+import { isFollowed, selectAndReveal } from "./selection.js";
+
+/** @typedef {import("../link/messages.js").PagePoint} PagePoint */
+/** @typedef {import("../link/messages.js").UndecidedSite} UndecidedSite */
+/** @typedef {import("../views/point-status.js").Status} Status */
+/**
+ * A point, or a place without one with all that is undecided there.
+ *
+ * @typedef {{ key: string, vine: number, spur: number, status: Status, row: PagePoint|null, sites: readonly UndecidedSite[] }} Item
+ */
+
+/** A decision that was sent counts as made for this time, until the robot tells (ms). */
+const SENT_MS = 4000;
+
+/** The item that is looked at; empty before the first. */
+export const current = signal("");
+/** Places that a person of this page has left as they are, by key, with what they left. */
+const left = signal(/** @type {ReadonlyMap<string, string>} */ (new Map()));
+/** Grows with every change of what is decided here and not yet told by the robot. */
+export const changes = signal(0);
+/** Decisions under way, by key: when they were sent, and about which state. @type {Map<string, { at: number, state: string }>} */
+const sent = new Map();
+
+/** @param {PagePoint} row */
+export function keyOfPoint(row) {
+  return row.point.point_id;
+}
+
+/** @type {readonly Item[]} */
+let built = [];
+/** @type {readonly unknown[]} */
+let builtFrom = [];
+
+/** All points and places, in the order of the row. @returns {readonly Item[]} */
+export function items() {
+  const page = points.get();
+  const from = [page, left.get()];
+  if (from.every((each, k) => each === builtFrom[k])) return built;
+  builtFrom = from;
+  built = [...(page?.points ?? []).map(ofPoint), ...places(page?.undecided_sites ?? [])].sort(
+    (a, b) => a.vine - b.vine || a.spur - b.spur || Number(a.row === null) - Number(b.row === null),
+  );
+  return built;
+}
+
+/**
+ * @param {PagePoint} row
+ * @returns {Item}
+ */
+function ofPoint(row) {
+  const { vine, spur } = row.point;
+  return { key: keyOfPoint(row), vine, spur, status: statusOf(row.entry.state), row, sites: [] };
+}
+
+/**
+ * @param {readonly UndecidedSite[]} sites Those of no spur in particular are none to decide about.
+ * @returns {Item[]}
+ */
+function places(sites) {
+  /** @type {Map<string, UndecidedSite[]>} */
+  const bySpur = new Map();
+  for (const site of sites) {
+    if (site.vine === 0) continue;
+    const key = `place-${site.vine}-${site.spur}`;
+    bySpur.set(key, [...(bySpur.get(key) ?? []), site]);
+  }
+  return [...bySpur].map(([key, all]) => {
+    const { vine, spur } = /** @type {UndecidedSite} */ (all[0]);
+    const status = left.get().get(key) === whatOf(all) ? "left" : "decide";
+    return { key, vine, spur, status, row: null, sites: all };
+  });
+}
+
+/** What a place is about: where it becomes another matter, it is to be decided anew. @param {readonly UndecidedSite[]} sites */
+function whatOf(sites) {
+  return sites.map((site) => site.reason.code).join();
+}
+
+/** @param {string} key */
+export function itemOf(key) {
+  return items().find((item) => item.key === key);
+}
+
+/** Does a person have to decide about it? @param {Item} item */
+export function isOpen(item) {
+  if (isSent(item.key)) return false;
+  return item.status === "proposed" || item.status === "decide";
+}
+
+/** Places that another look of the camera may settle come last. @param {Item} item */
+function canWait(item) {
+  return item.sites.length > 0 && item.sites.every((site) => site.needs === "another look");
+}
+
+/**
+ * Items to decide after one of them, the next first; those before it follow, as on a round.
+ *
+ * @param {Pick<Item, "key"|"vine"|"spur">|undefined} after
+ * @returns {Item[]}
+ */
+export function openAfter(after) {
+  const all = items();
+  const at = all.findIndex((item) => item.key === after?.key);
+  // One that has vanished: after its place along the row.
+  const passed = all.filter((item) => after && (item.vine < after.vine || (item.vine === after.vine && item.spur <= after.spur)));
+  const from = at >= 0 ? at + 1 : passed.length;
+  const round = [...all.slice(from), ...all.slice(0, from)].filter((item) => isOpen(item) && item.key !== after?.key);
+  return [...round.filter((item) => !canWait(item)), ...round.filter(canWait)];
+}
+
+/** Look at an item: the views go there. @param {string} key */
+export function look(key) {
+  current.set(key);
+  selectAndReveal(itemOf(key)?.row ? key : "");
+}
+
+/**
+ * Look at the neighbour of an item along the row.
+ *
+ * @param {1|-1} step
+ */
+export function step(step) {
+  const all = items();
+  const at = all.findIndex((item) => item.key === current.get());
+  const next = all[at < 0 ? 0 : Math.max(0, Math.min(all.length - 1, at + step))];
+  if (next) look(next.key);
+}
+
+/**
+ * Count an item as decided while its decision is under way.
+ *
+ * @param {string} key
+ * @param {Promise<boolean>} done Was it accepted?
+ */
+export async function whileSent(key, done) {
+  sent.set(key, { at: performance.now(), state: itemOf(key)?.row?.entry.state ?? "" });
+  changes.set(changes.get() + 1);
+  const ok = await done;
+  if (!ok) sent.delete(key);
+  changes.set(changes.get() + 1);
+  return ok;
+}
+
+/** Is a decision about it under way? @param {string} key */
+export function isSent(key) {
+  const decision = sent.get(key);
+  if (!decision) return false;
+  // Told by the robot, or waited for long enough.
+  const told = itemOf(key)?.row?.entry.state !== decision.state;
+  if (told || performance.now() - decision.at > SENT_MS) sent.delete(key);
+  return sent.has(key);
+}
+
+/** Leave a place as it is: nothing is cut there anyway. @param {Item} item */
+export function leavePlace(item) {
+  remember(item.key, whatOf(item.sites));
+  const back = async () => {
+    remember(item.key, "");
+    return true;
+  };
+  pushUndo(text("review.undo_place", { vine: item.vine, spur: item.spur }), back, item.key);
+}
+
+/**
+ * @param {string} key
+ * @param {string} what What was left there; empty where it is to be decided again.
+ */
+function remember(key, what) {
+  left.set(new Map(left.get()).set(key, what));
+  changes.set(changes.get() + 1);
+}
+
+// A point that is chosen anywhere is looked at. The work does not take a picture away under a press.
+selected.subscribe((pointId) => {
+  if (pointId && !(isFollowed() && items().some(isOpen))) current.set(pointId);
+});
