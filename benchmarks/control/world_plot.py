@@ -42,13 +42,15 @@ def draw_world(folder: Path, figure: Figure) -> None:
     panels = figure.subplots(rows, min(_COLUMNS, len(names)), sharex=True, sharey=True, squeeze=False).ravel()
     for panel, name in zip(panels, names, strict=False):
         points = {"calm": calm, **curves[name]}
-        shown = [(k, point) for k, level in enumerate(_LEVELS) if (point := points.get(level)) is not None]
+        # Where nothing is proposed there is no share.
+        known = [(k, points.get(level)) for k, level in enumerate(_LEVELS)]
+        shown = [(k, point) for k, point in known if point is not None and point["value"] is not None]
         places = [k for k, _ in shown]
         values = [100 * point["value"] for _, point in shown]
         below = [value - 100 * point["low"] for value, (_, point) in zip(values, shown, strict=True)]
         above = [100 * point["high"] - value for value, (_, point) in zip(values, shown, strict=True)]
         panel.errorbar(places, values, [below, above], color=_COLOUR, marker="o", ms=4, capsize=2)
-        panel.set_title(f"{name} (n {min(point['n'] for _, point in shown)})", fontsize=9)
+        panel.set_title(f"{name} (n {min((point['n'] for _, point in shown), default=0)})", fontsize=9)
         panel.set_xticks(range(len(_LEVELS)), _LEVELS)
         panel.set_ylim(-3, 103)
     for panel in panels[len(names) :]:

@@ -57,7 +57,7 @@ def test_what_was_run_is_on_disk_and_drawn(tmp_path: Path, monkeypatch: pytest.M
 
     def worked_off(seed, points, method, pictures, segmenter, world):
         worlds.append((seed, world))
-        return run(cut(), cut(right=world == CALM))
+        return run() if world.depth_lost == PRESETS["storm"].depth_lost else run(cut(), cut(right=world == CALM))
 
     monkeypatch.setattr(bench, "cut_row", worked_off)
     path = tmp_path / "world.json"
@@ -65,7 +65,8 @@ def test_what_was_run_is_on_disk_and_drawn(tmp_path: Path, monkeypatch: pytest.M
     assert [seed for seed, _ in worlds] == [2000, 2001] * 3
     assert [world for _, world in worlds[::2]] == list(PRESETS.values())
     summary = json.loads(path.read_text())["summary"]
-    assert summary["all, calm"]["right"]["value"] == 1.0 and summary["all, storm"]["right"]["value"] == 0.5
+    assert summary["all, calm"]["right"]["value"] == 1.0 and summary["all, field"]["right"]["value"] == 0.5
+    assert summary["all, storm"]["right"]["value"] is None, "nothing was proposed"
     assert bench.main(["--each", "--count", "1", "--json", str(tmp_path / "world_each.json")]) == 0
     figure = Figure()
     draw_world(tmp_path, figure)
