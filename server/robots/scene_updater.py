@@ -34,11 +34,10 @@ class SceneUpdater:
 
     def place_camera(self, session: Session, preset: CameraPreset) -> None:
         """Move the cameras of this session's views to a preset, once the robot's posture is known."""
-        now = time.monotonic()
-        posture, tool = self._link.posture(now), self._view.tool(now)
-        if posture is not None and tool is not None:
+        posture = self._link.posture(time.monotonic())
+        if posture is not None:
             q: Array = configuration(posture.base, posture.position)
-            self._scene.place_camera(session.session_id, preset, q, np.array(tool.position))
+            self._scene.place_camera(session.session_id, preset, q)
 
     def show_layers(self, session: Session, layers: tuple[Layer, ...]) -> None:
         """Show these layers on this session's views and no others."""
@@ -66,7 +65,7 @@ class SceneUpdater:
         link, scene = self._link, self._scene
         if points is not self._points:
             self._points = points
-            scene.show_points(points.points)
+            scene.show_points(points.points, points.undecided_sites)
         bridge = link.bridge.peek()
         scene.show_cuts(points.points, None if bridge is None else bridge.message, now)
         if (received := link.points.peek()) is not None:

@@ -24,6 +24,8 @@ _MIN_LENGTH = 0.01
 #: A falling piece fades from the first time on and is removed at the second (s).
 _FADE_START_S, _LIFETIME_S = 0.6, 1.0
 _GRAVITY = 9.81
+#: Of what will fall, and of what falls.
+FALLS_COLOR, FALLS_OPACITY = (214, 40, 40), 0.5
 
 
 def cut_points(points: Iterable[PagePoint], bridge: m.BridgeState | None) -> dict[str, Cut]:
@@ -40,6 +42,15 @@ def cut_points(points: Iterable[PagePoint], bridge: m.BridgeState | None) -> dic
         row.point.point_id: (row.point.position, row.point.tangent)
         for row in points
         if row.entry.state == "DONE" or (row.entry.state == "CUTTING" and reported and row.entry.cut_id == reported)
+    }
+
+
+def will_fall(points: Iterable[PagePoint]) -> dict[str, Cut]:
+    """The accepted cuts, beyond which a cane will fall."""
+    return {
+        row.point.point_id: (row.point.position, row.point.tangent)
+        for row in points
+        if row.entry.state in ("ACCEPTED", "CUTTING")
     }
 
 
@@ -151,8 +162,8 @@ class FallingPieces:
             f"{root}/falling{self._number}",
             vertices,
             faces,
-            color=color_of("cane", dim),
-            opacity=1.0,
+            color=color_of("cane", dim) if dim else FALLS_COLOR,
+            opacity=FALLS_OPACITY,
             flat_shading=True,
             cast_shadow=False,
             receive_shadow=False,
@@ -171,5 +182,5 @@ class FallingPieces:
                     continue
                 down = min(0.5 * _GRAVITY * age**2, piece.height)
                 piece.handle.position = np.array([0.0, 0.0, -down])
-                piece.handle.opacity = min(1.0, (_LIFETIME_S - age) / (_LIFETIME_S - _FADE_START_S))
+                piece.handle.opacity = FALLS_OPACITY * min(1.0, (_LIFETIME_S - age) / (_LIFETIME_S - _FADE_START_S))
         self._pieces = [piece for piece in self._pieces if now - piece.started_at < _LIFETIME_S]

@@ -1,9 +1,8 @@
-"""Builds the scene's meshes: of the robot from the visuals of our URDFs and of the Panda's, and of the markers.
+"""Builds the scene's meshes: of the robot from the visuals of our URDFs and of the Panda's, and a ball.
 
 The server does not import this module, which brings a mesh library: `solids.py` runs it in a process of its own.
 """
 
-import math
 import pickle
 import sys
 import xml.etree.ElementTree as ET
@@ -29,10 +28,6 @@ _DENSITY = 14_000
 _FEWEST_FACES = 48
 #: Edges sharper than this (rad) stay sharp when shaded.
 _CREASE = 0.6
-_DISC_RADIUS = 0.034
-_DISC_HEIGHT = 0.004
-_BALL_RADIUS = 0.016
-_CROSS = (0.25 * math.pi, -0.25 * math.pi)
 
 
 def robot_parts(model: Any) -> list[Part]:
@@ -134,26 +129,6 @@ def _numbers(text: str) -> Array:
     return np.array([float(value) for value in text.split()])
 
 
-def cut_marker() -> trimesh.Trimesh:
-    """A disc in the cutting plane around a ball; the cane's tangent is z, the origin is the cut (m)."""
-    disc = trimesh.creation.cylinder(radius=_DISC_RADIUS, height=_DISC_HEIGHT, sections=24)
-    ball = trimesh.creation.icosphere(subdivisions=1, radius=_BALL_RADIUS)
-    return trimesh.util.concatenate([disc, ball])
-
-
-def unreachable_marker() -> trimesh.Trimesh:
-    """Two crossed bars in the cutting plane, in the frame of a cut marker (m)."""
-    length, width = 2.4 * _DISC_RADIUS, 0.014
-    bar = trimesh.creation.box((length, width, width))
-    bars = [bar.copy().apply_transform(trimesh.transformations.rotation_matrix(turn, (0, 0, 1))) for turn in _CROSS]
-    return trimesh.util.concatenate(bars)
-
-
-def selection_ring() -> trimesh.Trimesh:
-    """A ring around a cut marker, in the same frame."""
-    return trimesh.creation.torus(major_radius=0.052, minor_radius=0.004, major_sections=32, minor_sections=8)
-
-
 def end_ball() -> trimesh.Trimesh:
     """A ball for an end of a measured distance."""
     return trimesh.creation.icosphere(subdivisions=1, radius=0.012)
@@ -167,9 +142,6 @@ def main() -> None:
     """Write all meshes to the standard output."""
     solids = Solids(
         robot=tuple(robot_parts(RobotModel().model)),
-        cut_marker=_solid(cut_marker()),
-        unreachable_marker=_solid(unreachable_marker()),
-        selection_ring=_solid(selection_ring()),
         end_ball=_solid(end_ball()),
     )
     pickle.dump(solids, sys.stdout.buffer)

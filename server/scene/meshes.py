@@ -1,7 +1,8 @@
-"""Meshes of the 3-D view: the plant's capsules, the markers of pruning points, and their colours."""
+"""Meshes of the 3-D view: the plant's capsules, and the colours of wood and of the points' states."""
+
+from collections.abc import Iterable
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from rolling_panda import messages as m
@@ -35,6 +36,35 @@ _KINDS: dict[m.WoodClass, tuple[Color, int]] = {
 }
 
 
+#: Length of a capsule's tips, in radii.
+_TIP = 0.5
+#: Lowest seen end of a trunk or post (m) from which it is drawn down to the ground.
+_SEEN_LOW = 0.7
+
+
+def on_the_ground(capsules: Iterable[Capsule]) -> list[Capsule]:
+    """Trunks and posts down to the ground, on which they stand though the camera does not look so low.
+
+    Of each, only the piece that reaches lowest is lengthened.
+    """
+    rows = list(capsules)
+    lowest: dict[tuple[str, int, float], int] = {}
+    for number, each in enumerate(rows):
+        if each.kind in ("trunk", "post"):
+            low = min(each.start, each.end, key=lambda place: place[2])
+            key = (each.kind, each.vine, round(low[0], 0))
+            at = lowest.get(key)
+            if at is None or low[2] < min(rows[at].start[2], rows[at].end[2]):
+                lowest[key] = number
+    for number in lowest.values():
+        each = rows[number]
+        flip = each.start[2] <= each.end[2]
+        low, radius = (each.start, each.start_radius) if flip else (each.end, each.end_radius)
+        if 0.02 < low[2] < _SEEN_LOW:
+            rows.append(Capsule(each.kind, (low[0], low[1], 0.0), low, radius, radius))
+    return rows
+
+
 def drawn_kinds() -> tuple[m.WoodClass, ...]:
     """Kinds of capsules that are drawn."""
     return tuple(_KINDS)
@@ -49,7 +79,7 @@ def color_of(kind: m.WoodClass, dim: bool = False) -> Color:
 def capsules_mesh(
     kind: m.WoodClass, capsules: list[Capsule], grow: float = 0.0
 ) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
-    """Vertices (V, 3) in odom (m) and faces (F, 3) of capsules, drawn with flat ends.
+    """Vertices (V, 3) in odom (m) and faces (F, 3) of capsules. Their blunt tips close the bends between them.
 
     Args:
         kind: Decides the number of sides.
@@ -70,8 +100,10 @@ def capsules_mesh(
     around = np.cos(angle)[None, :, None] * u[:, None] + np.sin(angle)[None, :, None] * v[:, None]
     bottom = start[:, None] + radii[:, :1, None] * around
     top = end[:, None] + radii[:, 1:, None] * around
-    vertices = np.concatenate([bottom, top], axis=1)
-    faces = _prism_faces(sides)[None] + (np.arange(len(capsules)) * 2 * sides)[:, None, None]
+    below = start - _TIP * radii[:, :1] * axis
+    above = end + _TIP * radii[:, 1:] * axis
+    vertices = np.concatenate([bottom, top, below[:, None], above[:, None]], axis=1)
+    faces = _prism_faces(sides)[None] + (np.arange(len(capsules)) * (2 * sides + 2))[:, None, None]
     return vertices.reshape(-1, 3).astype(np.float32), faces.reshape(-1, 3).astype(np.uint32)
 
 
@@ -79,15 +111,8 @@ def _prism_faces(sides: int) -> NDArray[np.int64]:
     i = np.arange(sides)
     j = (i + 1) % sides
     walls = np.concatenate([np.stack([i, j, j + sides], 1), np.stack([i, j + sides, i + sides], 1)])
-    fan = np.arange(1, sides - 1)
-    lid = np.stack([np.zeros_like(fan), fan, fan + 1], 1)
-    return np.concatenate([walls, lid[:, ::-1], lid + sides])
-
-
-def quat_wxyz_of_axis(axis: m.UnitVector3) -> NDArray[np.float64]:
-    """The shortest rotation of z onto `axis`, in viser's order w, x, y, z."""
-    x, y, z, w = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), np.array(axis)).coeffs()
-    return np.array([w, x, y, z])
+    below, above = np.full_like(i, 2 * sides), np.full_like(i, 2 * sides + 1)
+    return np.concatenate([walls, np.stack([j, i, below], 1), np.stack([i + sides, j + sides, above], 1)])
 
 
 def quat_wxyz(quat_xyzw: m.QuatXyzw) -> tuple[float, float, float, float]:

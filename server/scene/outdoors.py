@@ -42,8 +42,10 @@ def draw_outdoors(scene: viser.SceneApi) -> None:
         section_color=plain,
         cell_size=20.0,
         section_size=20.0,
-        fade_distance=70.0,
-        fade_strength=0.6,
+        cell_thickness=0.0,
+        section_thickness=0.0,
+        fade_distance=80.0,
+        fade_strength=0.25,
         shadow_opacity=0.0,
     )
     scene.add_image(

@@ -10,9 +10,11 @@ import pinocchio as pin
 import viser
 
 from rolling_panda import messages as m
+from rolling_panda.messages.perception import Capsule
 from rolling_panda.messages.supervision import PreviewMotion, PreviewRow
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import configuration
+from rolling_panda.model.wire_values import vector3
 from server.scene.meshes import Color
 from server.scene.outdoors import draw_shadow
 from server.scene.solids import Part
@@ -22,11 +24,13 @@ _BASE_JOINT = "base_phi"
 _DEADBAND = 2e-5
 #: The base's: odometry drifts by a third of a millimetre, and of a milliradian, at standstill.
 _BASE_DEADBAND = 1e-3
+#: Height of the base (m), and radius of the arm's rods (m).
+_DECK, _ARM_RADIUS = 0.3, 0.075
 _GHOST_COLOR, _GHOST_OPACITY = (120, 190, 255), 0.35
-_TRAIL = "/trail/line"
-#: Distance between two points of the trail (m), and their largest number.
-_TRAIL_STEP, _TRAIL_POINTS = 0.01, 200
-_TRAIL_NEW, _TRAIL_OLD = np.array([150, 205, 255.0]), np.array([62, 72, 84.0])
+_TRAIL = "/trail/dots"
+#: Distance between two dots of the trail, their size (m), and their largest number.
+_TRAIL_STEP, _TRAIL_DOT, _TRAIL_POINTS = 0.025, 0.008, 60
+_TRAIL_NEW, _TRAIL_OLD = np.array([255, 120, 60.0]), np.array([196, 176, 150.0])
 
 
 class SceneRobot:
@@ -38,6 +42,7 @@ class SceneRobot:
         self._model = model
         self._data = model.createData()
         self._base = int(model.getJointId(_BASE_JOINT))
+        self._tool = int(model.getFrameId("tool"))
         names = {0: "", self._base: "/robot"}
         self._frames: dict[int, viser.FrameHandle] = {}
         self._sent: dict[int, Array] = {}
@@ -75,6 +80,21 @@ class SceneRobot:
                 self._frames[joint].position = pose[:3]
                 self._frames[joint].wxyz = pose[3:]
         return True
+
+    @property
+    def tool(self) -> tuple[Array, Array]:
+        """Position of the tool (3, m) and the direction in which the blades point (3, unit), in odom."""
+        T_odom_tool = pin.updateFramePlacement(self._model, self._data, self._tool)
+        return T_odom_tool.translation.copy(), T_odom_tool.rotation[:, 2].copy()
+
+    def rods(self) -> tuple[Capsule, ...]:
+        """The arm as rods from joint to joint (odom), to tell roughly what it hides."""
+        places = [self._data.oMi[joint].translation for joint in range(self._base + 1, self._model.njoints)]
+        places = [*(place for place in places if place[2] > _DECK), self.tool[0]]
+        return tuple(
+            Capsule("post", vector3(a), vector3(b), _ARM_RADIUS, _ARM_RADIUS)
+            for a, b in zip(places, places[1:], strict=False)
+        )
 
     def triangles(self) -> Array:
         """Every triangle of the robot as drawn now (n×3×3, m, odom)."""
@@ -166,7 +186,7 @@ class PreviewGhost:
 
 
 class ToolTrail:
-    """The tool's last positions as a line that fades into the past; sent only when it has grown."""
+    """The tool's last positions as dots that fade into the past, unlike a wire; sent only when there are more."""
 
     def __init__(self, server: viser.ViserServer) -> None:
         """Start with an empty trail."""
@@ -178,21 +198,19 @@ class ToolTrail:
         if self._positions and float(np.linalg.norm(np.subtract(position, self._positions[-1]))) < _TRAIL_STEP:
             return False
         self._positions.append(position)
-        if len(self._positions) > 1:
-            self._draw()
-        return True
-
-    def _draw(self) -> None:
-        positions = np.array(self._positions, dtype=np.float32)
-        fade = np.linspace(0.0, 1.0, len(positions))[:, None]
-        colors = (_TRAIL_OLD + fade * (_TRAIL_NEW - _TRAIL_OLD)).astype(np.uint8)
-        self._server.scene.add_line_segments(
+        if len(self._positions) < 2:
+            return True
+        fade = np.linspace(0.0, 1.0, len(self._positions))[:, None]
+        self._server.scene.add_point_cloud(
             _TRAIL,
-            np.stack([positions[:-1], positions[1:]], axis=1),
-            colors=np.stack([colors[:-1], colors[1:]], axis=1),
-            thickness=2.0,
-            thickness_units="screen",
+            np.array(self._positions, dtype=np.float32),
+            (_TRAIL_OLD + fade * (_TRAIL_NEW - _TRAIL_OLD)).astype(np.uint8),
+            point_size=_TRAIL_DOT,
+            point_shape="circle",
+            point_shading="flat",
+            precision="float32",
         )
+        return True
 
 
 def configuration_at(rows: Sequence[PreviewRow], time: float) -> Array:

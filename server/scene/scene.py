@@ -1,6 +1,6 @@
 """The 3-D view: a viser server on a loopback port of its own, seen by browsers through the filtering proxy alone."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable
 from typing import Any, Protocol
 
 import numpy as np
@@ -8,19 +8,25 @@ import viser
 
 from rolling_panda import messages as m
 from rolling_panda.messages.page import CameraPreset, GizmoAxes, Layer, PagePoint
-from rolling_panda.messages.perception import Capsule, Obstacles, Scenery
+from rolling_panda.messages.perception import Capsule, Obstacles, Scenery, UndecidedSite
 from rolling_panda.model.differential_drive import Array
 from server.scene.camera_view import DecodedFrame, draw_frustum, draw_point_cloud, remove_camera_view
 from server.scene.cameras import SceneCameras
-from server.scene.cut_canes import Cut, FallingPieces, Line, as_capsules, cut_points, removed_capsules, standing
-from server.scene.gizmo import SceneGizmos
-from server.scene.meshes import (
-    STATE_COLORS,
-    capsules_mesh,
-    color_of,
-    drawn_kinds,
-    quat_wxyz_of_axis,
+from server.scene.cut_canes import (
+    FALLS_COLOR,
+    FALLS_OPACITY,
+    Cut,
+    FallingPieces,
+    Line,
+    as_capsules,
+    cut_points,
+    removed_capsules,
+    standing,
+    will_fall,
 )
+from server.scene.gizmo import SceneGizmos
+from server.scene.markers import PointMarkers
+from server.scene.meshes import capsules_mesh, color_of, drawn_kinds, on_the_ground
 from server.scene.outdoors import VineNumbers, draw_outdoors
 from server.scene.picking import (
     ClickListener,
@@ -36,22 +42,17 @@ from server.scene.robot import PreviewGhost, SceneRobot, ToolTrail
 from server.scene.solids import Solids
 from server.scene.viser_adapter.view_server import ViewServer
 
-_CANE_LINES = "/plant/canes"
-_SELECTION = "/selection"
-#: Of the axes of perceived canes, sRGB.
-_CANE_COLOR = (120, 84, 56)
+_CANES, _FALLS = "/plant/canes", "/plant/falls"
+#: Radius of a perceived cane as drawn (m): thinner ones become dashes without antialiasing.
+_CANE_RADIUS = 0.005
 #: The fall is animated for at most this many cuts since the last message about the row.
 _MAX_ANIMATED_CUTS = 5
-#: Radius of a falling piece of cane (m).
-_FALLING_RADIUS = 0.004
 #: Added to the radius of perceived capsules (m), which otherwise coincide with those of the simulated row.
 _PERCEIVED_MARGIN = 0.002
-#: Offset of the lines of canes, towards the robot (m): inside the wood they would be hidden.
-_CANE_LINE_OFFSET = np.array([0.0, -0.008, 0.0], dtype=np.float32)
 #: Layers of a session that has not chosen any.
 DEFAULT_LAYERS: frozenset[Layer] = frozenset({"plant", "points", "trail"})
 #: Nodes of the layers that all views share; the other layers are drawn for each view.
-_SHARED_LAYERS: dict[Layer, str] = {"plant": "/plant", "simulated": "/row", "points": "/points", "trail": "/trail"}
+_SHARED_LAYERS: dict[Layer, str] = {"plant": "/plant", "simulated": "/row", "trail": "/trail"}
 
 
 class CallSoon(Protocol):
@@ -89,9 +90,12 @@ class Scene:
         self.gizmos = SceneGizmos()
         self._clicks = ClickListener(lambda *ray: call_soon(on_ray, *ray))
         self._on_select = on_select
-        self._solids = solids
-        self._points: dict[str, tuple[PagePoint, viser.MeshHandle]] = {}
+        self.markers = PointMarkers(self._on_marker)
+        self._points: dict[str, PagePoint] = {}
         self._canes: tuple[Line, ...] = ()
+        self._standing: list[Line] = []
+        #: The accepted cuts whose falling parts are drawn; None where the canes have changed since.
+        self._drawn_falls: dict[str, Cut] | None = None
         self._cuts: dict[str, Cut] = {}
         self._uncut: set[str] = set()
         self._row: Scenery | None = None
@@ -112,6 +116,7 @@ class Scene:
         self.falling = FallingPieces(self._server)
         self._distance_tool = DistanceTool(solids.end_ball)
         self.robot = SceneRobot(self._server, model, solids.robot)
+        self.cameras.hides(self.robot.rods)
         self.ghost = PreviewGhost(model, solids.robot)
         self._server.on_client_connect(self._on_connect)
         self._server.on_client_disconnect(self._on_disconnect)
@@ -133,12 +138,12 @@ class Scene:
 
     def show_plant(self, seen: Obstacles) -> None:
         """Draw posts, trunks, cordons, wires and canes as perceived; unchanged kinds are not sent again."""
-        self._show_capsules("/plant", seen.capsules, self._plant, grow=_PERCEIVED_MARGIN)
+        self._show_capsules("/plant", on_the_ground(seen.capsules), self._plant, grow=_PERCEIVED_MARGIN)
 
     def _show_capsules(
         self,
         root: str,
-        capsules: tuple[Capsule, ...],
+        capsules: Iterable[Capsule],
         drawn: dict[str, list[Capsule]],
         dim: bool = False,
         grow: float = 0.0,
@@ -158,23 +163,17 @@ class Scene:
                     vertices,
                     faces,
                     color=color_of(kind, dim),
-                    flat_shading=True,
                     receive_shadow=False,
                 )
             else:
                 self._server.scene.remove_by_name(f"{root}/{kind}")
 
-    def show_points(self, points: tuple[PagePoint, ...]) -> None:
-        """Draw the pruning points, coloured by state; only what changed is sent."""
-        shown = {row.point.point_id: row for row in points}
-        with self._server.atomic():
-            for point_id in [key for key in self._points if key not in shown]:
-                self._points.pop(point_id)[1].remove()
-            for point_id, row in shown.items():
-                self._show_point(point_id, row)
-            self._numbers.show(points)
-        for owner in list(self._selected):
-            self._draw_selection(owner)
+    def show_points(self, points: tuple[PagePoint, ...], sites: tuple[UndecidedSite, ...] = ()) -> None:
+        """Draw the pruning points by their state, and the sites that a person has to decide."""
+        self._points = {row.point.point_id: row for row in points}
+        self.markers.show(points, sites)
+        self._numbers.show(points)
+        self._draw_falls()
         self._start_pending_flights()
 
     def show_cuts(self, points: tuple[PagePoint, ...], bridge: m.BridgeState | None, now: float) -> None:
@@ -191,35 +190,48 @@ class Scene:
             self._cuts = cuts
             for name, line in self._draw_canes().items():
                 if name in new:
-                    self.falling.drop("/plant", as_capsules(line, _FALLING_RADIUS), now)
+                    self.falling.drop("/plant", as_capsules(line, _CANE_RADIUS), now)
         self._uncut = {row.point.point_id for row in points} - cuts.keys()
 
     def show_canes(self, canes: tuple[Line, ...]) -> None:
-        """Draw the axes of the perceived canes (polylines in odom from the base on, m) up to their cuts."""
+        """Draw the perceived canes, by their axes (polylines in odom from the base on, m), up to their cuts."""
         if canes != self._canes:
             self._canes = canes
             self._draw_canes()
 
     def _draw_canes(self) -> dict[str, Line]:
         """Draw the standing parts; returns the parts beyond the cuts, by point."""
-        left, off = standing(self._canes, self._cuts)
-        pairs = [(a, b) for line in left for a, b in zip(line, line[1:], strict=False)]
-        if pairs:
-            self._server.scene.add_line_segments(
-                _CANE_LINES,
-                np.array(pairs, dtype=np.float32) + _CANE_LINE_OFFSET,
-                colors=_CANE_COLOR,
-                thickness=2.5,
-                thickness_units="screen",
-            )
-        else:
-            self._server.scene.remove_by_name(_CANE_LINES)
+        self._standing, off = standing(self._canes, self._cuts)
+        self._drawn_falls = None
+        self._draw_falls()
         return off
+
+    def _draw_falls(self) -> None:
+        """Draw the standing canes as wood, and red and see-through what falls at the accepted cuts."""
+        accepted = will_fall(self._points.values())
+        if self._drawn_falls == accepted:
+            return
+        self._drawn_falls = accepted
+        stays, falls = standing(self._standing, accepted)
+        for name, lines, color, opacity in (
+            (_CANES, stays, color_of("cane"), None),
+            (_FALLS, list(falls.values()), FALLS_COLOR, FALLS_OPACITY),
+        ):
+            capsules = [capsule for line in lines for capsule in as_capsules(line, _CANE_RADIUS)]
+            if not capsules:
+                self._server.scene.remove_by_name(name)
+                continue
+            vertices, faces = capsules_mesh("cane", capsules)
+            self._server.scene.add_mesh_simple(
+                name, vertices, faces, color=color, opacity=opacity, flat_shading=False, cast_shadow=False,
+                receive_shadow=False,
+            )  # fmt: skip
 
     def select(self, owner: str, point_id: str) -> None:
         """Mark a point as selected on the views of `owner`; empty = none."""
         self._selected[owner] = point_id
-        self._draw_selection(owner)
+        for client in self._clients(owner):
+            self.markers.choose(client.client_id, point_id)
 
     def fly_to(self, owner: str, point_id: str, wait_for_user: bool = False) -> None:
         """Fly the cameras of the views of `owner` to a point; see `SceneCameras.fly`.
@@ -231,7 +243,7 @@ class Scene:
             self._pending_flights[owner] = point_id, wait_for_user
             return
         self._pending_flights.pop(owner, None)
-        self.cameras.fly(clients, np.array(known[0].point.position), wait_for_user)
+        self.cameras.fly(clients, np.array(known.point.position), wait_for_user)
 
     def _start_pending_flights(self) -> None:
         for owner, (point_id, wait_for_user) in list(self._pending_flights.items()):
@@ -239,8 +251,9 @@ class Scene:
                 self.fly_to(owner, point_id, wait_for_user)
 
     def step_cameras(self, now: float) -> None:
-        """Move the cameras that fly to a point; `now` is monotonic (s)."""
+        """Move the cameras that fly to a point, and fit the markers to the cameras; `now` is monotonic (s)."""
         self.cameras.step(list(self._server.get_clients().values()), now)
+        self.markers.step(now)
 
     def show_gizmo(self, owner: str, tool: m.Pose, axes: GizmoAxes = "tool") -> None:
         """Show the gizmo of `owner` at the tool (pose in odom), along these axes."""
@@ -257,9 +270,10 @@ class Scene:
         else:
             self._clicks.stop(owner)
 
-    def place_camera(self, owner: str, preset: CameraPreset, q: Array, tool: Array) -> None:
-        """Move the cameras of the views of `owner` to a preset; robot at q (12), tool at a position (3, m)."""
-        self.cameras.apply_preset(preset, self._clients(owner), q, tool)
+    def place_camera(self, owner: str, preset: CameraPreset, q: Array) -> None:
+        """Move the cameras of the views of `owner` to a preset; robot at q (12)."""
+        self.robot.move(q)
+        self.cameras.apply_preset(preset, self._clients(owner), q, *self.robot.tool)
 
     def show_layers(self, owner: str, layers: Collection[Layer]) -> None:
         """Show `owner` these layers and no others."""
@@ -314,65 +328,18 @@ class Scene:
     def move(self, q: Array) -> bool:
         """Show the robot at q (12); True when something was sent."""
         self.gizmos.heading = float(q[2])
-        self.cameras.follow(q)
-        return self.robot.move(q)
+        moved = self.robot.move(q)
+        self.cameras.follow(q, self.robot.tool[0])
+        return moved
 
     def close(self) -> None:
         """Stop viser."""
         self.views.close()
 
-    def _show_point(self, point_id: str, row: PagePoint) -> None:
-        color = STATE_COLORS[row.entry.state]
-        wxyz = quat_wxyz_of_axis(row.point.tangent)
-        unreachable = row.entry.state == "UNREACHABLE"
-        known = self._points.get(point_id)
-        if known is None or (known[0].entry.state == "UNREACHABLE") != unreachable:
-            if known is not None:
-                known[1].remove()
-            mesh = self._solids.unreachable_marker if unreachable else self._solids.cut_marker
-            handle = self._server.scene.add_mesh_simple(
-                f"/points/{point_id}",
-                mesh.vertices,
-                mesh.faces,
-                color=color,
-                flat_shading=True,
-                cast_shadow=False,
-                receive_shadow=False,
-                position=row.point.position,
-                wxyz=wxyz,
-            )
-
-            async def clicked(event: viser.SceneNodePointerEvent[Any]) -> None:
-                owner = self.views.owner(event.client_id)
-                if owner is not None:
-                    self._call_soon(self._on_select, owner, point_id)
-
-            handle.on_click(clicked)
-        else:
-            before, handle = known
-            if before.entry.state != row.entry.state:
-                handle.color = color
-            if before.point.position != row.point.position:
-                handle.position = row.point.position
-            if before.point.tangent != row.point.tangent:
-                handle.wxyz = wxyz
-        self._points[point_id] = (row, handle)
-
-    def _draw_selection(self, owner: str) -> None:
-        shown = self._points.get(self._selected.get(owner, ""))
-        for client in self._clients(owner):
-            if shown is None:
-                client.scene.remove_by_name(_SELECTION)
-                continue
-            point = shown[0].point
-            ring = client.scene.get_handle_by_name(_SELECTION)
-            if ring is None:
-                mesh = self._solids.selection_ring
-                ring = client.scene.add_mesh_simple(
-                    _SELECTION, mesh.vertices, mesh.faces, color=(255, 255, 255), cast_shadow=False
-                )
-            ring.position = point.position
-            ring.wxyz = quat_wxyz_of_axis(point.tangent)
+    def _on_marker(self, client_id: int, point_id: str) -> None:
+        owner = self.views.owner(client_id)
+        if owner is not None:
+            self._call_soon(self._on_select, owner, point_id)
 
     def _layers_of(self, owner: str) -> frozenset[Layer]:
         return self._layers.get(owner, DEFAULT_LAYERS)
@@ -381,6 +348,7 @@ class Scene:
         shown = self._layers_of(owner)
         for layer, name in _SHARED_LAYERS.items():
             self.views.set_visible(client.client_id, name, layer in shown)
+        self.markers.set_visible(client.client_id, "points" in shown)
 
     def _clients(self, owner: str) -> list[viser.ClientHandle]:
         clients = self._server.get_clients()
@@ -397,8 +365,9 @@ class Scene:
         if owner is not None:
             self.gizmos.attach(owner, client)
             self._clicks.attach(owner, client)
+            visible, chosen = "points" in self._layers_of(owner), self._selected.get(owner, "")
+            self.markers.attach(client, self.views.pixel_ratio(client.client_id), visible, chosen)
             self._apply_layers(owner, client)
-            self._draw_selection(owner)
             self.ghost.attach(owner, client)
             self._start_pending_flights()
 
@@ -406,4 +375,5 @@ class Scene:
         self.gizmos.detach(client_id)
         self._clicks.detach(client_id)
         self.ghost.detach(client_id)
+        self.markers.detach(client_id)
         self.cameras.forget(client_id)

@@ -1,4 +1,4 @@
-"""Meshes of fixed shape: the robot's bodies and the markers.
+"""Meshes of fixed shape: the robot's bodies, and the ball of the distance tool.
 
 `mesh_builder.py` makes them in a process of its own, which ends with it: its libraries would take a third of the
 server's memory for as long as the server runs.
@@ -49,12 +49,9 @@ class Part:
 
 @dataclass(frozen=True)
 class Solids:
-    """All of them; `mesh_builder.py` describes the markers' frames."""
+    """All of them."""
 
     robot: tuple[Part, ...]
-    cut_marker: Solid
-    unreachable_marker: Solid
-    selection_ring: Solid
     end_ball: Solid
 
 

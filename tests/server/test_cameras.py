@@ -8,7 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rolling_panda.messages.page import CameraPreset
+from rolling_panda.messages.perception import Capsule
 from server.scene.cameras import USER_PRIORITY_S, SceneCameras, close_up, preset_pose
+from server.scene.sight import blocked
 
 TOOL = np.array([0.6, 0.5, 1.0])
 SERVER = SimpleNamespace(initial_camera=SimpleNamespace())
@@ -47,8 +49,33 @@ def test_it_turns_with_the_base():
     assert turned.position == pytest.approx([-straight.position[1], straight.position[0], straight.position[2]])
 
 
-def test_the_preset_of_the_tool_looks_at_it():
-    assert preset_pose("tool", at(), TOOL).look_at == pytest.approx(TOOL)
+def test_the_preset_of_the_tool_shows_the_blades_and_what_they_point_at():
+    ahead = np.array([0.0, 1.0, 0.0])
+    pose = preset_pose("tool", at(), TOOL, ahead)
+    sight = (pose.look_at - pose.position) / np.linalg.norm(pose.look_at - pose.position)
+    for place in (TOOL, TOOL + 0.2 * ahead):
+        away = place - pose.position
+        assert np.degrees(np.arccos(sight @ away / np.linalg.norm(away))) < 20.0, "both are near the middle of the view"
+    arm = Capsule("post", tuple(TOOL), tuple(TOOL + 2.0 * (pose.position - TOOL)), 0.08, 0.08)
+    beside = preset_pose("tool", at(), TOOL, ahead, [arm])
+    assert blocked(pose.position, TOOL, [arm]) > 0.0 == blocked(beside.position, TOOL, [arm])
+
+
+def test_a_view_of_the_tool_goes_with_it():
+    cameras, mine = SceneCameras(SERVER), view()
+    cameras.apply_preset("tool", [mine], at(), TOOL)
+    before = mine.camera.position.copy()
+    cameras.follow(at(1.0), TOOL + [0.0, 0.1, 0.2])
+    assert mine.camera.position - before == pytest.approx([0.0, 0.1, 0.2])
+
+
+def test_the_arm_does_not_stand_before_a_point_that_is_looked_at_closely():
+    position = np.array([2.0, -0.5, 1.2])
+    plain = close_up(POINT, position, 0.0)
+    arm = Capsule("post", tuple(POINT + 0.4 * (plain.position - POINT)), (2.0, 0.0, 0.4), 0.08, 0.08)
+    beside = close_up(POINT, position, 0.0, [arm])
+    assert blocked(plain.position, POINT, [arm]) > 0.0 == blocked(beside.position, POINT, [arm])
+    assert (beside.look_at == POINT).all()
 
 
 def test_a_view_that_opens_later_begins_near_the_robot():

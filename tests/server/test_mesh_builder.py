@@ -7,7 +7,7 @@ import trimesh
 
 from rolling_panda.errors import ModelError
 from rolling_panda.model.robot import RobotModel
-from server.scene.mesh_builder import cut_marker, simplified, unreachable_marker
+from server.scene.mesh_builder import simplified
 from server.scene.solids import build_solids
 
 MODEL = RobotModel().model
@@ -57,20 +57,6 @@ def test_faces_point_at_vertices_that_exist():
     for part in build_solids().robot:
         assert part.faces.max() < len(part.vertices)
         assert np.isfinite(part.vertices).all()
-
-
-def test_the_marker_is_wider_than_a_cane_and_centred_on_the_cut():
-    low, high = cut_marker().bounds
-    assert high[0] > 0.015
-    assert low == pytest.approx(-high, abs=1e-6)
-
-
-def test_what_cannot_be_reached_has_a_shape_of_its_own_in_the_same_place():
-    cut, beyond = cut_marker(), unreachable_marker()
-    assert beyond.bounds[0] == pytest.approx(-beyond.bounds[1], abs=1e-6)
-    assert np.ptp(beyond.bounds[:, 0]) == pytest.approx(np.ptp(cut.bounds[:, 0]), rel=0.2), "as large"
-    # A disc has a surface between the bars of a cross.
-    assert beyond.volume > 0 and not beyond.contains([[0.03, 0.0, 0.0]])[0] and cut.contains([[0.03, 0.0, 0.0]])[0]
 
 
 def test_the_server_does_without_the_mesh_library():

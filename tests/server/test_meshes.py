@@ -1,11 +1,8 @@
 from typing import get_args
 
 import numpy as np
-import pinocchio as pin
 import pytest
 import trimesh
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import Capsule
@@ -15,7 +12,6 @@ from server.scene.meshes import (
     color_of,
     drawn_kinds,
     quat_wxyz,
-    quat_wxyz_of_axis,
 )
 
 
@@ -29,7 +25,7 @@ def test_a_rod_is_a_closed_solid_of_about_its_size(end):
     solid = trimesh.Trimesh(vertices, faces, process=False)
     assert solid.is_watertight
     length = float(np.linalg.norm(end))
-    assert 0.85 * np.pi * 0.02**2 * length < solid.volume <= np.pi * 0.02**2 * length
+    assert 0.85 * np.pi * 0.02**2 * length < solid.volume <= np.pi * 0.02**2 * (length + 0.01)
 
 
 def test_many_rods_are_one_mesh_with_each_in_its_place():
@@ -55,25 +51,6 @@ def test_what_nobody_has_seen_is_dimmer_and_what_is_seen_drawn_around_it():
     rods = [rod("wire", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.001, 0.001))]
     thin, thick = (np.ptp(capsules_mesh("wire", rods, grow)[0][:, 2]) for grow in (0.0, 0.002))
     assert thick - thin > 0.003
-
-
-PART = st.floats(-1.0, 1.0)
-
-
-@settings(max_examples=100)
-@given(st.tuples(PART, PART, PART).filter(lambda axis: np.linalg.norm(axis) > 0.1))
-def test_the_markers_axis_lies_along_the_cane(axis):
-    assert z_turned_by(quat_wxyz_of_axis(axis)) == pytest.approx(np.array(axis) / np.linalg.norm(axis), abs=1e-6)
-
-
-@pytest.mark.parametrize("axis", [(0.0, 0.0, -1.0), (0.0, 2e-5, -1.0), (1e-7, 0.0, -1.0), (0.0, 0.0, 1.0)])
-def test_a_cane_that_hangs_straight_down_or_nearly_so_has_a_marker_too(axis):
-    assert z_turned_by(quat_wxyz_of_axis(axis)) == pytest.approx(np.array(axis), abs=1e-6)
-
-
-def z_turned_by(quat_wxyz):
-    w, x, y, z = quat_wxyz
-    return pin.Quaternion(w, x, y, z).toRotationMatrix() @ np.array([0.0, 0.0, 1.0])
 
 
 def test_viser_takes_the_scalar_first():

@@ -38,7 +38,7 @@ def server(view_port):
         wire.deliver(topics.ODOMETRY, odometry())
         wire.deliver(topics.POINTS, pruning_points(pruning_point("p1")))
         with running.client() as client:
-            eventually(lambda: {"/robot/panda_joint1", "/points/p1"} <= drawn(running, client))
+            eventually(lambda: {"/robot/panda_joint1", "/vines/0"} <= drawn(running, client))
         yield running
 
 
@@ -104,7 +104,8 @@ def test_the_view_shows_the_robot_and_the_points(server):
         names = {message.get("name") for message in hear(view, replayed)}
         assert "/robot" in names
         assert any("panda_joint7" in (name or "") for name in names)
-        assert "/points/p1" in names
+        say(view, CAMERA)
+        hear(view, lambda message: message.get("name") == "/markers/proposed/tint")
 
 
 def test_every_movement_is_shown_and_nothing_is_sent_at_rest(server):

@@ -3,6 +3,7 @@
 import threading
 from contextlib import contextmanager
 
+import msgspec
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
@@ -12,10 +13,15 @@ from rolling_panda.reasons import said
 from tests.server.test_misuse import control
 from tests.server.test_page_socket import Page
 from tests.server.test_proxy import drawn
-from tests.support.fake_wire import FakeWire, bridge_state, controller_state, pruning_point, pruning_points, telling
+from tests.support.fake_wire import FakeWire, bridge_state, controller_state, pruning_points, telling
 from tests.support.running_server import eventually, running_server
 
 NAMES = ("rp1", "rp2")
+
+
+def numbered(name):
+    """The point of a robot, on a vine of the robot's number."""
+    return msgspec.structs.replace(pruning_point(f"only-{name}"), vine=int(name[-1]))
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +31,7 @@ def server():
         for name, wire in wires.items():
             wire.deliver(topics.BRIDGE, bridge_state())
             wire.deliver(topics.CONTROLLER, controller_state(mode="READY" if name == "rp1" else "PAUSED"))
-            wire.deliver(topics.POINTS, pruning_points(pruning_point(f"only-{name}")))
+            wire.deliver(topics.POINTS, pruning_points(numbered(name)))
         running.wires = wires
         yield running
 
@@ -122,8 +128,8 @@ def test_what_is_asked_of_one_reaches_that_one_alone(robots, client):
         )
         with Page(robots[NAMES.index(name)], client) as page:
             assert page.hear("PageState")["controller"]["mode"] == {"rp1": "READY", "rp2": "PAUSED"}[name]
-    eventually(lambda: "/points/only-rp2" in drawn(other, client))
-    assert "/points/only-rp1" not in drawn(other, client)
+    eventually(lambda: "/vines/2" in drawn(other, client))
+    assert "/vines/1" not in drawn(other, client)
 
 
 def test_who_holds_control_of_one_holds_nothing_of_the_other(robots, client):

@@ -78,23 +78,23 @@ def test_before_the_first_and_after_the_last_row_the_robot_stands():
 
 def drawn_by():
     drawn = []
-    scene = SimpleNamespace(add_line_segments=lambda name, points, **looks: drawn.append((points, looks["colors"])))
+    scene = SimpleNamespace(add_point_cloud=lambda name, points, colors, **looks: drawn.append((points, colors)))
     return ToolTrail(SimpleNamespace(scene=scene)), drawn
 
 
 def test_the_trail_grows_as_the_tool_goes_and_noise_adds_nothing():
     trail, drawn = drawn_by()
     assert trail.extend((0.0, 0.0, 1.0))
-    assert not trail.extend((0.001, 0.0, 1.0)) and drawn == []
-    assert trail.extend((0.02, 0.0, 1.0))
+    assert not trail.extend((0.001, 0.0, 1.0)) and drawn == [], "one dot is no trail"
+    assert trail.extend((0.03, 0.0, 1.0))
     points, colors = drawn[-1]
-    assert np.allclose(points, [[[0.0, 0.0, 1.0], [0.02, 0.0, 1.0]]])
-    assert colors.shape == (1, 2, 3) and colors[0, 1].sum() > colors[0, 0].sum(), "the newest is the brightest"
+    assert np.allclose(points, [[0.0, 0.0, 1.0], [0.03, 0.0, 1.0]])
+    assert colors.shape == (2, 3) and (colors[0] != colors[1]).any(), "it fades into the past"
 
 
 def test_what_is_long_ago_goes():
     trail, drawn = drawn_by()
     for step in range(500):
-        trail.extend((0.02 * step, 0.0, 1.0))
+        trail.extend((0.03 * step, 0.0, 1.0))
     points, _ = drawn[-1]
-    assert len(points) < 250 and points[-1, 1, 0] > 9.9 and points[0, 0, 0] > 4.0
+    assert len(points) < 100 and points[-1, 0] > 14.9 and points[0, 0] > 12.0

@@ -58,9 +58,9 @@ def test_layers_are_those_of_one_session_and_stay_for_its_next_view(server):
             hear(view, replayed)
             say(view, CAMERA)
             hear(view, shows("/plant", True))
-            page.send('{"type":"ShowLayers","layers":["points"]}')
+            page.send('{"type":"ShowLayers","layers":["trail"]}')
             heard = hear(view, shows("/plant", False))
-            assert any(map(shows("/points", True), heard))
+            assert any(map(shows("/trail", True), heard))
             never(other_view, shows("/plant", False))
         with server.socket(client, "/viser") as view:
             hear(view, replayed)
@@ -94,7 +94,7 @@ def test_a_chosen_point_brings_the_cameras_of_who_chose_it_alone(server):
         server.wire.deliver(topics.POINTS, pruning_points(far, new))
         hear(view, looks_at(2.0))
         # A click onto its marker does the same, and tells the page.
-        say(view, CLICK | {"name": "/points/far"})
+        say(view, CLICK | {"name": "/markers/proposed/tint", "instance_index": 0})
         assert hear_kind(page, "Selected")["point_id"] == "far"
         never(other_view, placed)
 

@@ -2,6 +2,7 @@
 
 import asyncio
 import gzip
+import math
 import socket
 from collections.abc import Callable, Coroutine
 from typing import Any
@@ -77,7 +78,7 @@ def viser_router(
             local.setblocking(False)
             local.bind(("127.0.0.1", 0))
             port = int(local.getsockname()[1])
-            views.expect(port, session.session_id, session.may_operate)
+            views.expect(port, session.session_id, session.may_operate, _pixel_ratio(websocket))
             try:
                 await asyncio.get_running_loop().sock_connect(local, ("127.0.0.1", views.port))
                 async with connect(
@@ -99,6 +100,15 @@ def viser_router(
                     on_end(session, reason)
 
     return router
+
+
+def _pixel_ratio(websocket: WebSocket) -> float:
+    """Pixels of a CSS pixel, which `frame.js` has set as a cookie: viser tells the size of the view in pixels alone."""
+    try:
+        ratio = float(websocket.cookies.get("view-ratio", "1"))
+    except ValueError:
+        return 1.0
+    return min(max(ratio, 0.5), 4.0) if math.isfinite(ratio) else 1.0
 
 
 def _patched_client_page() -> bytes:

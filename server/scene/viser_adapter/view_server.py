@@ -23,10 +23,11 @@ _FEW_VIEWS, _VIEWER_PAUSE_S = 8, 0.2
 
 @dataclass(frozen=True)
 class _Owner:
-    """The session that owns a connection, and whether it may operate the robot."""
+    """The session that owns a connection, whether it may operate the robot, and the pixels of a CSS pixel there."""
 
     session_id: str
     may_operate: bool
+    pixel_ratio: float
 
 
 class ViewServer:
@@ -66,9 +67,9 @@ class ViewServer:
             lambda client_id: update_pause_s(len(self.viser.get_clients()), self._may_operate(client_id)),
         )
 
-    def expect(self, port: int, owner: str, may_operate: bool) -> None:
-        """Announce a connection from this local port that belongs to the session `owner`."""
-        self._expected[port] = _Owner(owner, may_operate)
+    def expect(self, port: int, owner: str, may_operate: bool, pixel_ratio: float = 1.0) -> None:
+        """Announce a connection from this local port of the session `owner`, with the pixels of a CSS pixel there."""
+        self._expected[port] = _Owner(owner, may_operate, pixel_ratio)
 
     def forget(self, port: int) -> None:
         """That connection has ended."""
@@ -78,6 +79,11 @@ class ViewServer:
         """The session that owns a viser client; None for a refused one."""
         owner = self._owners.get(client_id)
         return None if owner is None else owner.session_id
+
+    def pixel_ratio(self, client_id: int) -> float:
+        """Pixels of the view for each CSS pixel."""
+        owner = self._owners.get(client_id)
+        return 1.0 if owner is None else owner.pixel_ratio
 
     def set_visible(self, client_id: int, name: str, visible: bool) -> None:
         """Show or hide in one view a node that all views share."""

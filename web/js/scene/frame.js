@@ -66,6 +66,8 @@ const behind = [];
 // A fixed resolution: the client's adaptive one stalls a slow machine for seconds, and a stalled view ends a hold.
 const ratio = Math.min(window.devicePixelRatio, inSoftware ? LARGEST_RATIO_IN_SOFTWARE : LARGEST_RATIO);
 history.replaceState(null, "", `?fixedDpr=${ratio}`);
+// The client tells the server the size of the view in pixels alone, and markers have to be large enough for a finger.
+document.cookie = `view-ratio=${ratio}; path=/; samesite=strict`;
 reportWhenDrawn(plainRequest, () => behind.every((each) => !each.busy && !each.drawn));
 
 if (inSoftware) {
