@@ -41,7 +41,9 @@ def _work(context: ProcessContext) -> None:
     controller = Controller(config, robot_config, run_id)
     stop_file = open_stop_file(folder)
     before = restored(folder)
-    controller.restore(before.tickets, stop_file.value, before.order, before.preview, before.approaches)
+    controller.restore(
+        before.tickets, stop_file.value, before.order, before.preview, before.approaches, before.postures
+    )
     ledger = LedgerWriter(lambda: Ledger(folder))
     ledger.write([start_record(context.config_path, run_id)])
     planner = PlannerProcess(config, robot_config)

@@ -154,6 +154,7 @@ class WorkConfig(Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         home: Survey posture of the arm (rad), with the camera facing the row.
+        folded: Posture of the arm folded over the base (rad), to drive far.
         reach: Initial posture of the search for a cut posture (rad), elbow aside, tool to the left.
         row_heading: Direction of the row in odom (rad); the base keeps parallel to it, the row on its left.
         row_distance: Distance of the row from the line y = 0 along `row_heading` where the base drives (m).
@@ -180,6 +181,7 @@ class WorkConfig(Struct, frozen=True, forbid_unknown_fields=True):
     """
 
     home: ArmPosture = (-0.2784, -0.1128, -0.0354, -2.0055, 1.6759, 1.2124, -0.269)
+    folded: ArmPosture = (0.0, -1.2, 0.0, -2.6, 0.0, 1.9, 0.785)
     reach: ArmPosture = (-0.3, -1.2, 1.1, -1.7, 2.25, 2.4, 0.55)
     row_heading: float = 0.0
     row_distance: Annotated[float, within(0.5, 3.0)] = 0.75
@@ -239,6 +241,7 @@ class TeleoperationConfig(Struct, frozen=True, forbid_unknown_fields=True):
         hold_max_age_s: Teleoperation ends when the hold is not renewed for this long (s).
         speed: Speed limit of the tool in teleoperation (m/s).
         turn: Limit of the tool's angular speed in teleoperation (rad/s).
+        joint_speed: Speed limit of the fastest joint on the way to a posture (rad/s).
         base_speed: Speed limit of each wheel on the ground in teleoperation (m/s). From it, `base_braking` stops
             the base within 0.1 s, which leaves 50 ms for the message of the release.
         base: Base in teleoperation: `free` keeps it parallel to the row; in `transit` the tool's sideways motion
@@ -248,6 +251,7 @@ class TeleoperationConfig(Struct, frozen=True, forbid_unknown_fields=True):
     hold_max_age_s: Annotated[float, at_most(0.15)] = 0.15
     speed: Annotated[float, at_most(0.25)] = 0.25
     turn: Annotated[float, at_most(1.0)] = 0.6
+    joint_speed: Annotated[float, at_most(0.5)] = 0.35
     base_speed: Annotated[float, at_most(0.15)] = 0.15
     base: Literal["free", "transit"] = "free"
 

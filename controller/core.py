@@ -17,6 +17,7 @@ from controller.ledger.journal import (
     Journal,
     LedgerState,
     OrderRow,
+    PostureRow,
     PreviewRequiredRow,
     Records,
     RequestRow,
@@ -37,6 +38,7 @@ from controller.whole_body.task import Method
 from controller.work.movement import MotionResult, Movement
 from controller.work.point_queue import PointQueue, QueueRequests, Ticket
 from controller.work.posture_search import Found
+from controller.work.postures import Postures
 from controller.work.survey import open_place
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
@@ -91,6 +93,7 @@ class Controller:
         self._movement = Movement(
             config, robot_config, self._queue, self._event_log, run_id, self._known, method, permit
         )
+        self._postures = Postures(config.work, self._movement.body, self._movement.posture_check, self._journal)
         self._supervisor = Supervisor(config.supervision, self._movement, self._event_log, draw)
         self._handlers = self._all_handlers()
         self._inbox = Inbox()
@@ -127,13 +130,15 @@ class Controller:
         order: OrderRow | None = None,
         preview: PreviewRequiredRow | None = None,
         approaches: tuple[tuple[str, ApproachRow], ...] = (),
+        postures: tuple[tuple[str, PostureRow], ...] = (),
     ) -> None:
-        """Restore the queue, its order and the latched stops of an earlier start. Nothing resumes by itself."""
+        """Restore queue, order, postures and latched stops of an earlier start. Nothing resumes by itself."""
         if order is not None:
             self._queue.order.restore(order)
         if preview is not None:
             self._previews.restore(preview)
         self._queue.approaches.restore(approaches)
+        self._postures.restore(postures)
         self._queue.restore(rows)
         self._supervisor.restore(stops)
 
@@ -234,6 +239,7 @@ class Controller:
             **self._supervisor.authority.handlers(),
             **decisions,
             **self._previews.handlers(),
+            **self._postures.handlers(),
             intents.SetApproach: lambda asked, now: self._being_worked_on(asked.point_id) or turn(asked, now),
             intents.Arm: self._change_mode,
             intents.Resume: self._change_mode,
@@ -415,5 +421,6 @@ class Controller:
             order=self._queue.order.state,
             interrupted=self._supervisor.interrupted,
             relaxed_limits=self._relaxed_limits,
+            postures=self._postures.all,
             now=now,
         )

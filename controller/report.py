@@ -9,6 +9,7 @@ from controller.whole_body.joint_limits import margin
 from controller.whole_body.manipulability import arm_omega
 from rolling_panda import messages as m
 from rolling_panda import reasons
+from rolling_panda.messages.supervision import SavedPosture
 from rolling_panda.model.robot import RobotModel, pose_message
 from rolling_panda.transport.inbox import Inbox
 
@@ -29,6 +30,7 @@ def controller_state(
     order: m.QueueOrder,
     interrupted: m.Interrupted,
     relaxed_limits: tuple[m.Reason, ...],
+    postures: tuple[SavedPosture, ...],
     now: float,
 ) -> m.ControllerState:
     """The message of the controller's state.
@@ -48,6 +50,7 @@ def controller_state(
         order: Origin of that order.
         interrupted: Activity that a pause or a protective stop interrupted.
         relaxed_limits: Safety limits that the configuration sets less strictly than usual.
+        postures: Postures that the arm can be led to.
         now: Monotonic time (s).
     """
     omega = 0.0
@@ -82,6 +85,7 @@ def controller_state(
         order=order,
         interrupted=interrupted,
         relaxed_limits=relaxed_limits,
+        postures=postures,
     )
 
 

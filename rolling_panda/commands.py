@@ -14,7 +14,7 @@ from msgspec import Meta, Struct
 
 from rolling_panda import reasons
 from rolling_panda.messages.perception import PruningRule
-from rolling_panda.messages.supervision import NEVER_SEEN_S, ReplaySpeed
+from rolling_panda.messages.supervision import NEVER_SEEN_S, ArmAngles, ReplaySpeed
 from rolling_panda.messages.types import (
     Count,
     Digest,
@@ -349,6 +349,36 @@ class Home(Intent, frozen=True, kw_only=True):
     """READY: move the arm to its survey posture beside the row."""
 
 
+class SavePosture(Intent, frozen=True, kw_only=True):
+    """Save the present posture of the arm. It moves nothing.
+
+    Attributes:
+        posture: Name of the posture, as text.
+    """
+
+    posture: Text
+
+
+class DeletePosture(Intent, frozen=True, kw_only=True):
+    """Delete a saved posture.
+
+    Attributes:
+        posture: Name of the posture.
+    """
+
+    posture: Text
+
+
+class CheckPosture(Intent, frozen=True, kw_only=True):
+    """Ask whether the arm can go to a posture where the base stands. It moves nothing.
+
+    Attributes:
+        angles: Angles of the arm's joints (7, rad).
+    """
+
+    angles: ArmAngles
+
+
 class Acknowledge(Intent, frozen=True, kw_only=True):
     """PROTECTIVE_STOP → PAUSED or FAULT → IDLE, after the cause is gone."""
 
@@ -515,6 +545,11 @@ COMMANDS: Final[tuple[Command, ...]] = (
         modes=("READY",),
         conditions=_MOTION,
     ),
+    Command(SavePosture, "mode", "/postures/save", lambda asked: reasons.posture_saved(asked.user, asked.posture)),
+    Command(
+        DeletePosture, "mode", "/postures/delete", lambda asked: reasons.posture_deleted(asked.user, asked.posture)
+    ),
+    Command(CheckPosture, "mode", "/postures/check"),
     Command(Acknowledge, "mode", "/acknowledge", control=True, event=Event.ACKNOWLEDGE),
     Command(Reset, "mode", "/reset", role="supervisor", event=Event.RESET, conditions=("stop to release",)),
     Command(AcceptAll, "points", "/points/accept-all", conditions=("acceptable point",)),

@@ -731,6 +731,21 @@ def server_answered(status: float) -> None:
     """The server answered {status:.0f}."""
 
 
+@_reason("info", "")
+def posture_unchecked() -> None:
+    """The controller checks whether the arm can go there."""
+
+
+@_reason("info", "choose a posture, or type an angle")
+def no_posture_chosen() -> None:
+    """No posture is chosen."""
+
+
+@_reason("warning", "type an angle in degrees, such as 45")
+def angle_no_number(text: str) -> None:
+    """Not a number: “{text}”."""
+
+
 # Page: alarms
 
 
@@ -2257,6 +2272,59 @@ def order_of_plan() -> None:
 @_reason("warning", "choose a smaller angle")
 def approach_too_far(angle_deg: float, limit_deg: float) -> None:
     """The approach cannot be turned by {angle_deg:.0f}°; at most {limit_deg:.0f}° are possible."""
+
+
+# Work: postures
+
+
+@_reason("info", "")
+def posture_saved(user: str, name: str) -> None:
+    """{user} saved the posture “{name}”."""
+
+
+@_reason("info", "")
+def posture_deleted(user: str, name: str) -> None:
+    """{user} deleted the posture “{name}”."""
+
+
+@_reason("warning", "give it a name")
+def posture_name_empty() -> None:
+    """The posture has no name."""
+
+
+@_reason("warning", "choose a shorter one")
+def posture_name_long(length: float, most: float) -> None:
+    """The name has {length:.0f} characters, at most {most:.0f} are possible."""
+
+
+@_reason("warning", "choose another name, or delete that posture first")
+def posture_name_taken(name: str) -> None:
+    """There is a posture “{name}” already."""
+
+
+@_reason("warning", "")
+def posture_not_saved(name: str) -> None:
+    """There is no saved posture “{name}”."""
+
+
+@_reason("warning", "delete one first")
+def postures_full(most: float) -> None:
+    """{most:.0f} postures are saved, more are not possible."""
+
+
+@_reason("warning", "wait for the joint states")
+def posture_unmeasured() -> None:
+    """The posture of the arm is not known yet."""
+
+
+@_reason("warning", "")
+def posture_out_of_range(joint: float, angle_deg: float, low_deg: float, high_deg: float) -> None:
+    """Joint {joint:.0f} cannot turn to {angle_deg:.1f}°, only from {low_deg:.1f}° to {high_deg:.1f}°."""
+
+
+@_reason("warning", "drive the base elsewhere, or choose another posture")
+def posture_touches(distance_mm: float, part: str, other: str, needed_mm: float) -> None:
+    """In this posture {distance_mm:.0f} mm would be between {part} and {other}, {needed_mm:.0f} mm are needed."""
 
 
 # Work: motions and cuts

@@ -10,10 +10,11 @@ import msgspec
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda import reasons
+from rolling_panda.messages.supervision import ArmAngles
 
-#: Kind of a row: state of a point, order of work, approach, requirement of previews, command of an operator with its
-#: answer, stop, log line, start.
-Kind = Literal["ticket", "order", "approach", "preview", "request", "stop", "event", "start"]
+#: Kind of a row: state of a point, order of work, approach, requirement of previews, saved posture, command of an
+#: operator with its answer, stop, log line, start.
+Kind = Literal["ticket", "order", "approach", "preview", "posture", "request", "stop", "event", "start"]
 
 
 @dataclass(frozen=True)
@@ -78,6 +79,13 @@ class PreviewRequiredRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unkno
     """Whether a cut needs an approved preview, and who set that."""
 
     required: bool
+    user: str = ""
+
+
+class PostureRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Angles of the arm's joints (7, rad) that `user` has saved; None for a posture that was deleted."""
+
+    angles: ArmAngles | None
     user: str = ""
 
 

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from controller.ledger.journal import ApproachRow, OrderRow, PreviewRequiredRow, Record, TicketRow
+from controller.ledger.journal import ApproachRow, OrderRow, PostureRow, PreviewRequiredRow, Record, TicketRow
 from controller.ledger.store import Ledger
 from rolling_panda import __version__
 from rolling_panda.cli.about import About, about
@@ -50,12 +50,13 @@ def start_record(config: Path, run_id: str) -> Record:
 
 @dataclass(frozen=True)
 class Restored:
-    """State from the ledger: points, order of work, preview settings and approaches."""
+    """State from the ledger: points, order of work, preview settings, approaches and saved postures."""
 
     tickets: tuple[TicketRow, ...] = ()
     order: OrderRow | None = None
     preview: PreviewRequiredRow | None = None
     approaches: tuple[tuple[str, ApproachRow], ...] = ()
+    postures: tuple[tuple[str, PostureRow], ...] = ()
 
 
 def restored(folder: Path) -> Restored:
@@ -67,11 +68,13 @@ def restored(folder: Path) -> Restored:
     with Ledger(folder) as ledger:
         orders, previews = _newest(ledger, "order", OrderRow), _newest(ledger, "preview", PreviewRequiredRow)
         approaches = [name for name, _ in ledger.newest("approach")]
+        postures = [name for name, _ in ledger.newest("posture")]
         return Restored(
             tuple(_newest(ledger, "ticket", TicketRow)),
             orders[-1] if orders else None,
             previews[-1] if previews else None,
             tuple(zip(approaches, _newest(ledger, "approach", ApproachRow), strict=True)),
+            tuple(zip(postures, _newest(ledger, "posture", PostureRow), strict=True)),
         )
 
 

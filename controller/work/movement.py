@@ -13,6 +13,7 @@ from controller.work.cutting import CutSequence
 from controller.work.homing import Homing
 from controller.work.point_queue import PointQueue
 from controller.work.posture_search import CutClearance, Known, Permit, PostureSearch
+from controller.work.postures import PostureCheck
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.config import RobotConfig
@@ -77,7 +78,10 @@ class Movement:
             RobotModel(robot_config), config.work, config.whole_body.joint_margin, self._clearance.too_near
         )
         self.sequence = CutSequence(config, search, body.follower, body.saturation, queue, run_id, known, permit)
-        self.teleoperation = Teleoperation(config.teleoperation, config.work, body.follower, body.robot.drive)
+        self.posture_check = PostureCheck(RobotModel(robot_config), config.whole_body)
+        self.teleoperation = Teleoperation(
+            config.teleoperation, config.work, body.follower, body.robot.drive, body.dt, self.posture_check.refusal
+        )
         self._homing: Homing | None = None
         #: Tracking of the last step's motion; None without one.
         self.tracking: Tracking | None = None
@@ -101,6 +105,7 @@ class Movement:
         self.body.update(inbox)
         self.body.surroundings.work_at(self.sequence.places)
         self._clearance.update(inbox.newest(Obstacles))
+        self.posture_check.update(inbox.newest(Obstacles))
 
     def go_home(self) -> None:
         """Begin to bring the arm home."""
@@ -145,6 +150,8 @@ class Movement:
         if robot is None or not held or mode not in ("READY", "TELEOP", "AUTO"):
             return self.ramp()
         if mode == "TELEOP":
+            if (refused := self.teleoperation.refused(robot)) is not None:
+                return MotionResult(self._saturation.ramp(self._setpoints.sent), event=(Event.RELEASE, refused))
             self.tracking = self.teleoperation.step(robot)
             return MotionResult(self.tracking.xi)
         return self._bring_home(robot) if mode == "READY" else self._work(robot, now)

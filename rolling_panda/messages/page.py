@@ -7,11 +7,13 @@ from msgspec import Meta, Struct
 from rolling_panda.messages.perception import PruningPoint, PruningRule, UndecidedSite
 from rolling_panda.messages.robot import BridgeState, JointState
 from rolling_panda.messages.supervision import (
+    ArmAngles,
     ArmVelocities,
     BaseVelocity,
     ClientKey,
     ControllerState,
     ControlState,
+    GizmoAxes,
     PlanState,
     PointPlan,
     PreviewState,
@@ -19,6 +21,7 @@ from rolling_panda.messages.supervision import (
     ReplayState,
     SpeedScale,
     StopState,
+    ToolVelocity,
 )
 from rolling_panda.messages.types import (
     Angle,
@@ -38,8 +41,6 @@ from rolling_panda.messages.types import (
 )
 
 Age = Annotated[float, Meta(ge=0.0, le=1e9)]
-#: Frame whose axes the gizmo's arrows follow.
-GizmoAxes = Literal["tool", "base", "world"]
 CameraPreset = Literal["follow", "row", "tool", "top"]
 #: Layers of the 3-D view: perceived vines, pruning points, the tool's trail, the hand camera with its image, its depth
 #: as a point cloud, and the simulated row.
@@ -312,13 +313,15 @@ class Ping(PageMessage, frozen=True, kw_only=True):
 
 
 class Hold(PageMessage, frozen=True, kw_only=True):
-    """20 Hz while the operator holds a control. Without `base` and `joints` the tool follows the gizmo.
+    """20 Hz while the operator holds a control. Without any of the four motions the tool follows the gizmo.
 
     Attributes:
         sequence: Increases by one with each message.
         hold: False ends the hold at once; a timeout ends it too.
         base: Velocity of the base.
         joints: Velocities of the arm's joints (7, rad/s).
+        along: Velocity of the tool.
+        posture: Angles of the arm's joints to go to (7, rad).
         speed_scale: Fraction of the usual speed.
     """
 
@@ -326,12 +329,14 @@ class Hold(PageMessage, frozen=True, kw_only=True):
     hold: bool
     base: BaseVelocity | None = None
     joints: ArmVelocities | None = None
+    along: ToolVelocity | None = None
+    posture: ArmAngles | None = None
     speed_scale: SpeedScale = 1.0
 
     def __post_init__(self) -> None:
-        """Refuse both at once."""
-        if self.base is not None and self.joints is not None:
-            raise ValueError("either the base moves or the joints turn: leave out one of them")
+        """Refuse several at once."""
+        if sum(each is not None for each in (self.base, self.joints, self.along, self.posture)) > 1:
+            raise ValueError("base, joints, along and posture are different motions: leave out all but one of them")
 
 
 class ShowGizmo(PageMessage, frozen=True, kw_only=True):
@@ -364,6 +369,16 @@ class ShowPreview(PageMessage, frozen=True, kw_only=True):
     """
 
     time: NonNegative | None
+
+
+class ShowPosture(PageMessage, frozen=True, kw_only=True):
+    """Show the arm in another posture, see-through, in this session's 3-D views.
+
+    Attributes:
+        angles: Angles of the arm's joints (7, rad); None hides it.
+    """
+
+    angles: ArmAngles | None
 
 
 class PlaceCamera(PageMessage, frozen=True, kw_only=True):
@@ -409,4 +424,6 @@ class Select(PageMessage, frozen=True, kw_only=True):
 
 
 FromServer = PageState | PagePoints | PagePreview | PageEvents | Selected | PickRay | Measured | HoldEnded | Pong
-FromPage = Ping | Hold | ShowGizmo | PlaceByHand | PlaceCamera | ShowLayers | Measure | ShowPreview | Select
+FromPage = (
+    Ping | Hold | ShowGizmo | PlaceByHand | PlaceCamera | ShowLayers | Measure | ShowPreview | ShowPosture | Select
+)

@@ -107,6 +107,25 @@ class QueueOrder(Struct, frozen=True, forbid_unknown_fields=True):
     user: Text = ""
 
 
+JointAngle = Annotated[float, Meta(ge=-7.0, le=7.0)]
+#: Angles of the arm's joints, from the base on (rad).
+ArmAngles = tuple[JointAngle, JointAngle, JointAngle, JointAngle, JointAngle, JointAngle, JointAngle]
+
+
+class SavedPosture(Struct, frozen=True, forbid_unknown_fields=True):
+    """A posture of the arm with a name.
+
+    Attributes:
+        name: Name, as text; of a posture of the program `survey` or `folded`.
+        angles: Angles of the joints (7, rad).
+        user: The person who saved it; empty for a posture of the program.
+    """
+
+    name: Text
+    angles: ArmAngles
+    user: Text = ""
+
+
 class ControllerState(Message, frozen=True, kw_only=True):
     """Controller → all: mode, queue and tracking error.
 
@@ -136,6 +155,7 @@ class ControllerState(Message, frozen=True, kw_only=True):
         interrupted: Activity that a pause or a protective stop interrupted; empty after the next start, or when
             disarmed.
         relaxed_limits: Safety limits that its configuration sets less strictly than usual, within their hard bounds.
+        postures: Postures that the arm can be led to: those of the program, then the saved ones.
     """
 
     header: Header
@@ -161,6 +181,7 @@ class ControllerState(Message, frozen=True, kw_only=True):
     order: QueueOrder = QueueOrder()
     interrupted: Interrupted = ""
     relaxed_limits: tuple[Reason, ...] = ()
+    postures: tuple[SavedPosture, ...] = ()
 
 
 #: Public key of a client: a digest of its session, never the session itself. Empty = nobody.
@@ -575,11 +596,33 @@ class BaseVelocity(Struct, frozen=True, forbid_unknown_fields=True):
     angular: Annotated[float, Meta(ge=-4.0, le=4.0)]
 
 
+#: Frame whose axes a motion by hand, and the gizmo's arrows, follow.
+GizmoAxes = Literal["tool", "base", "world"]
+_Speed = Annotated[float, Meta(ge=-2.0, le=2.0)]
+
+
+class ToolVelocity(Struct, frozen=True, forbid_unknown_fields=True):
+    """Velocity of the tool along and about the axes of a frame, as these were when the hold began.
+
+    Attributes:
+        linear: Along x, y and z (m/s).
+        angular: About x, y and z, at the tool (rad/s).
+        axes: Frame of the axes.
+        duration_s: The motion ends after so long at full speed (s), a step; without it only the hold ends it.
+    """
+
+    linear: tuple[_Speed, _Speed, _Speed]
+    angular: tuple[_Speed, _Speed, _Speed]
+    axes: GizmoAxes = "tool"
+    duration_s: Annotated[float, Meta(ge=0.0, le=60.0)] | None = None
+
+
 class TeleopTarget(Message, frozen=True, kw_only=True):
     """Server → controller while the operator holds a control: target of the motion by hand.
 
     With `target` alone the tool follows the target, with base and arm. With `target` and `base` the tool stays at the
-    target while the base moves, as far as the arm allows. With `base` alone the arm rests, with `joints` the base.
+    target while the base moves, as far as the arm allows. With `base` alone the arm rests, with `joints` the base. With
+    `along` the tool moves along an axis, with `posture` the arm goes to a posture, straight in its joints.
 
     Attributes:
         sequence: Strictly increasing; a lower one is refused until the hold has ended by timeout.
@@ -588,6 +631,8 @@ class TeleopTarget(Message, frozen=True, kw_only=True):
         target: Desired T_odom_tool.
         base: Velocity of the base.
         joints: Velocities of the arm's joints (7, rad/s).
+        along: Velocity of the tool.
+        posture: Angles of the arm's joints to go to (7, rad).
         client: Key of the client, to distinguish clients of one user.
         speed_scale: Fraction of the usual speed.
         round_trip_s: Round-trip time between server and page, measured by the server (s).
@@ -599,6 +644,8 @@ class TeleopTarget(Message, frozen=True, kw_only=True):
     target: Pose | None = None
     base: BaseVelocity | None = None
     joints: ArmVelocities | None = None
+    along: ToolVelocity | None = None
+    posture: ArmAngles | None = None
     client: Annotated[str, Meta(max_length=64)] = ""
     speed_scale: SpeedScale = 1.0
     round_trip_s: NonNegative = 0.0

@@ -29,6 +29,7 @@ from rolling_panda.messages.page import (
     Selected,
     ShowGizmo,
     ShowLayers,
+    ShowPosture,
     ShowPreview,
 )
 from rolling_panda.messages.supervision import PreviewState
@@ -202,6 +203,8 @@ class PageSocket:
                 self._robot.pages.place_by_hand(self, active)
             case ShowPreview(time=moment):
                 self._robot.scene.show_ghost(self.session.session_id, moment)
+            case ShowPosture(angles=angles):
+                self._robot.scene_updater.show_posture(self.session, angles)
             case PlaceCamera(preset=preset):
                 self._robot.scene_updater.place_camera(self.session, preset)
             case ShowLayers(layers=layers):
@@ -221,8 +224,8 @@ class PageSocket:
         if teleop.must_release(self.session, now) and self._holding:
             self._end_hold(reasons.hold_interrupted())
             return
-        drives = message.base is not None or message.joints is not None
-        command = TeleopCommand(None, message.base, message.joints) if drives else None
+        led = TeleopCommand(None, message.base, message.joints, message.along, message.posture)
+        command = None if led == TeleopCommand() else led
         refused = teleop.hold(self.session, now, command, self.view, message.speed_scale)
         if refused is None:
             self._holding = True

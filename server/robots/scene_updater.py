@@ -7,8 +7,9 @@ import numpy as np
 
 from rolling_panda import messages as m
 from rolling_panda.messages.page import CameraPreset, Layer, Measured, PagePoints
+from rolling_panda.messages.supervision import ArmAngles
 from rolling_panda.model.differential_drive import Array
-from rolling_panda.model.robot import configuration
+from rolling_panda.model.robot import ARM_Q, configuration
 from rolling_panda.model.wire_values import vector3
 from server.auth.sessions import Session
 from server.robots.link import RobotLink
@@ -38,6 +39,15 @@ class SceneUpdater:
         if posture is not None:
             q: Array = configuration(posture.base, posture.position)
             self._scene.place_camera(session.session_id, preset, q)
+
+    def show_posture(self, session: Session, angles: ArmAngles | None) -> None:
+        """Show the arm in a posture (7, rad) on this session's views, where the base stands; None hides it."""
+        posture = self._link.posture(time.monotonic())
+        q: Array | None = None
+        if angles is not None and posture is not None:
+            q = configuration(posture.base, posture.position)
+            q[ARM_Q] = angles
+        self._scene.show_posture(session.session_id, q)
 
     def show_layers(self, session: Session, layers: tuple[Layer, ...]) -> None:
         """Show these layers on this session's views and no others."""

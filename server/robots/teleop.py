@@ -9,8 +9,14 @@ from dataclasses import dataclass
 
 from rolling_panda import messages as m
 from rolling_panda import reasons
-from rolling_panda.messages.page import GizmoAxes
-from rolling_panda.messages.supervision import ArmVelocities, BaseVelocity, TeleopTarget
+from rolling_panda.messages.supervision import (
+    ArmAngles,
+    ArmVelocities,
+    BaseVelocity,
+    GizmoAxes,
+    TeleopTarget,
+    ToolVelocity,
+)
 from rolling_panda.runtime.token_bucket import TokenBuckets
 from server.auth.sessions import Session
 from server.config import ServerConfig
@@ -35,6 +41,8 @@ class TeleopCommand:
     target: m.Pose | None = None
     base: BaseVelocity | None = None
     joints: ArmVelocities | None = None
+    along: ToolVelocity | None = None
+    posture: ArmAngles | None = None
 
 
 @dataclass
@@ -187,6 +195,8 @@ class TeleopHold:
             target=command.target,
             base=command.base,
             joints=command.joints,
+            along=command.along,
+            posture=command.posture,
             client=hold.client,
             speed_scale=hold.speed_scale,
             round_trip_s=min(self._latency_s.get(hold.view, 0.0), 1e3),

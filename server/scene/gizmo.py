@@ -9,7 +9,7 @@ import pinocchio as pin
 import viser
 
 from rolling_panda import messages as m
-from rolling_panda.messages.page import GizmoAxes
+from rolling_panda.messages.supervision import GizmoAxes
 from rolling_panda.model.robot import placement
 from server.scene.viser_adapter.view_server import adopt_pose
 

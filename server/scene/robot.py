@@ -117,15 +117,17 @@ class SceneRobot:
 
 
 class PreviewGhost:
-    """The robot at a time of the preview, see-through, with the path of the tool; each session has its own time."""
+    """The robot at a time of the preview or in another posture, see-through; each session has its own."""
 
     def __init__(self, model: Any, parts: Sequence[Part]) -> None:
         """Bind the robot's Pinocchio model and its meshes."""
         self._model, self._parts = model, parts
         self._data = model.createData()
         self._base = int(model.getJointId(_BASE_JOINT))
-        self._times: dict[str, float] = {}
+        #: What each owner sees: the configuration (12), and the hash of the preview whose path is drawn with it.
+        self._shown: dict[str, tuple[Array, str]] = {}
         self._motion: PreviewMotion | None = None
+        #: Hash of the preview whose path a view shows; empty without one.
         self._drawn: dict[int, str] = {}
 
     def set_motion(self, motion: PreviewMotion) -> None:
@@ -135,26 +137,37 @@ class PreviewGhost:
     def show(self, owner: str, time: float | None, clients: Sequence[viser.ClientHandle]) -> None:
         """Show the robot at a time of the preview (s) on the views of `owner`; None hides it."""
         if time is None or self._motion is None or not self._motion.rows:
-            self._times.pop(owner, None)
-            for client in clients:
-                client.scene.remove_by_name("/ghost")
-                self._drawn.pop(client.client_id, None)
+            self.show_at(owner, None, clients)
+        else:
+            self._show(owner, configuration_at(self._motion.rows, time), self._motion.preview_hash, clients)
+
+    def show_at(self, owner: str, q: Array | None, clients: Sequence[viser.ClientHandle]) -> None:
+        """Show the robot at q (12) on the views of `owner`; None hides it."""
+        if q is not None:
+            self._show(owner, q, "", clients)
             return
-        self._times[owner] = time
+        self._shown.pop(owner, None)
         for client in clients:
-            self._draw(client, self._motion, configuration_at(self._motion.rows, time))
+            client.scene.remove_by_name("/ghost")
+            self._drawn.pop(client.client_id, None)
 
     def attach(self, owner: str, client: viser.ClientHandle) -> None:
         """A view of `owner` has opened."""
-        if owner in self._times:
-            self.show(owner, self._times[owner], [client])
+        if owner in self._shown:
+            self._show(owner, *self._shown[owner], [client])
 
     def detach(self, client_id: int) -> None:
         """A view has closed."""
         self._drawn.pop(client_id, None)
 
-    def _draw(self, client: viser.ClientHandle, motion: PreviewMotion, q: Array) -> None:
+    def _show(self, owner: str, q: Array, path: str, clients: Sequence[viser.ClientHandle]) -> None:
+        self._shown[owner] = q, path
+        for client in clients:
+            self._draw(client, q, path)
+
+    def _draw(self, client: viser.ClientHandle, q: Array, path: str) -> None:
         if client.client_id not in self._drawn:
+            self._drawn[client.client_id] = ""
             for joint in range(self._base, self._model.njoints):
                 client.scene.add_frame(f"/ghost/{joint}", show_axes=False)
             for number, part in enumerate(self._parts):
@@ -167,14 +180,16 @@ class PreviewGhost:
                     cast_shadow=False,
                     receive_shadow=False,
                 )
-        if self._drawn.get(client.client_id) != motion.preview_hash:
-            self._drawn[client.client_id] = motion.preview_hash
-            tools = [row.tool for row in motion.rows]
+        if self._drawn[client.client_id] != path:
+            self._drawn[client.client_id] = path
+            tools = [row.tool for row in self._motion.rows] if path and self._motion is not None else []
             pairs = np.array(list(zip(tools, tools[1:], strict=False)), dtype=np.float32)
             if len(pairs):
                 client.scene.add_line_segments(
                     "/ghost/tool", pairs, colors=_GHOST_COLOR, thickness=2.0, thickness_units="screen"
                 )
+            else:
+                client.scene.remove_by_name("/ghost/tool")
         pin.forwardKinematics(self._model, self._data, q)
         with client.atomic():
             for joint in range(self._base, self._model.njoints):

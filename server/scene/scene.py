@@ -7,8 +7,9 @@ import numpy as np
 import viser
 
 from rolling_panda import messages as m
-from rolling_panda.messages.page import CameraPreset, GizmoAxes, Layer, PagePoint
+from rolling_panda.messages.page import CameraPreset, Layer, PagePoint
 from rolling_panda.messages.perception import Capsule, Obstacles, Scenery, UndecidedSite
+from rolling_panda.messages.supervision import GizmoAxes
 from rolling_panda.model.differential_drive import Array
 from server.scene.camera_view import DecodedFrame, draw_frustum, draw_point_cloud, remove_camera_view
 from server.scene.cameras import SceneCameras
@@ -262,6 +263,10 @@ class Scene:
     def show_ghost(self, owner: str, time: float | None) -> None:
         """Show a time of the preview (s) on the views of `owner`; None hides it."""
         self.ghost.show(owner, time, self._clients(owner))
+
+    def show_posture(self, owner: str, q: Array | None) -> None:
+        """Show the robot at another configuration (12), see-through, on the views of `owner`; None hides it."""
+        self.ghost.show_at(owner, q, self._clients(owner))
 
     def listen_to_clicks(self, owner: str, listening: bool) -> None:
         """Turn the clicks of `owner` into rays, or no more."""

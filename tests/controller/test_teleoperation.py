@@ -9,7 +9,7 @@ from controller.motion.teleoperation import Teleoperation, latency_speed_scale
 from rolling_panda import commands as intents
 from rolling_panda.config import RobotConfig
 from rolling_panda.messages.perception import Capsule
-from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
+from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget, ToolVelocity
 from rolling_panda.model.robot import pose_message
 from rolling_panda.reasons import text_of
 from rolling_panda.transport.inbox import Received
@@ -144,7 +144,7 @@ def test_silence_ends_the_hold():
 
 def test_a_demand_that_comes_late_or_twice_counts_for_nothing():
     teleoperation, age = (
-        Teleoperation(CONFIG.teleoperation, CONFIG.work, None, None),
+        Teleoperation(CONFIG.teleoperation, CONFIG.work, None, None, 0.01, lambda *_: None),
         CONFIG.teleoperation.hold_max_age_s,
     )
 
@@ -294,3 +294,117 @@ def test_a_tool_that_is_led_along_the_row_takes_the_base_no_faster_than_that():
         fastest = max(fastest, np.abs(r.xi[:2]).max() * r.model.drive.wheel_radius)
     assert fastest == pytest.approx(CONFIG.teleoperation.base_speed, rel=0.02)
     assert r.q[0] > 0.3, "and it does take it along"
+
+
+# --- along an axis, and to a posture ----------------------------------------------------------------------------------
+
+
+def lead(r, sequence=1, **wanted):
+    r.teleop = TeleopTarget(sequence=sequence, hold=True, user="ada", **wanted)
+
+
+def test_a_held_arrow_moves_the_tool_straight_along_its_axis_and_release_ends_it():
+    r = robot()
+    start = tool(r)
+    lead(r, along=ToolVelocity((0.0, 0.0, 0.08), (0.0, 0.0, 0.0), "world"))
+    r.run(2.0)
+    way = tool(r).translation - start.translation
+    assert way[2] == pytest.approx(0.16, abs=0.04) and np.abs(way[:2]).max() < 0.005
+    assert np.linalg.norm(pin.log3(start.rotation.T @ tool(r).rotation)) < 0.02
+    r.teleop = TeleopTarget(sequence=2, hold=False, user="ada")
+    r.run(0.3)
+    rest = tool(r).translation
+    r.run(0.5)
+    assert tool(r).translation == pytest.approx(rest, abs=1e-4) and r.state.mode == "READY"
+
+
+@pytest.mark.parametrize(("axes", "direction"), [("tool", None), ("world", (0.0, 1.0, 0.0))])
+def test_a_step_is_as_long_as_it_says_however_long_it_is_held(axes, direction):
+    r = robot()
+    start = tool(r)
+    lead(r, along=ToolVelocity((0.0, 0.05, 0.0), (0.0, 0.0, 0.0), axes, duration_s=0.4))
+    r.run(4.0)
+    along = start.rotation[:, 1] if direction is None else np.array(direction)
+    assert tool(r).translation - start.translation == pytest.approx(0.02 * along, abs=0.002)
+    assert r.state.mode == "TELEOP", "it is still held"
+
+
+def test_a_held_arc_turns_the_tool_about_its_axis_in_place():
+    r = robot()
+    start = tool(r)
+    lead(r, along=ToolVelocity((0.0, 0.0, 0.0), (0.0, 0.0, 0.3), "tool", duration_s=0.5))
+    r.run(4.0)
+    assert pin.log3(start.rotation.T @ tool(r).rotation) == pytest.approx([0.0, 0.0, 0.15], abs=0.01)
+    assert np.linalg.norm(tool(r).translation - start.translation) < 0.003
+
+
+def test_each_press_of_a_step_begins_anew_where_the_tool_is():
+    r = robot()
+    start = tool(r)
+    step = ToolVelocity((0.0, 0.0, 0.05), (0.0, 0.0, 0.0), "world", duration_s=0.2)
+    for press in range(3):
+        lead(r, 2 * press + 1, along=step)
+        r.run(2.0)
+        r.teleop = TeleopTarget(sequence=2 * press + 2, hold=False, user="ada")
+        r.run(0.3)
+    assert tool(r).translation[2] - start.translation[2] == pytest.approx(0.03, abs=0.002)
+
+
+def test_the_arm_goes_to_a_posture_while_it_is_held_and_the_base_rests():
+    r = robot()
+    goal = tuple(angle + 0.25 * way for angle, way in zip(CONFIG.work.home, (1, 0, -1, 0, 1, 0, 1), strict=True))
+    before = r.q.copy()
+    lead(r, posture=goal)
+    r.run(0.3)
+    r.teleop = TeleopTarget(sequence=2, hold=False, user="ada")
+    r.run(0.5)
+    part = r.q[5:].copy()
+    assert 0.0 < np.abs(part - before[5:]).max() < 0.2, "it goes no further than it is held"
+    lead(r, 3, posture=goal)
+    fastest = 0.0
+    for _ in range(400):
+        then = r.q[5:].copy()
+        r.step()
+        fastest = max(fastest, float(np.abs(r.q[5:] - then).max()) / r.dt)
+    assert r.q[5:] == pytest.approx(goal, abs=0.01) and r.q[:3] == pytest.approx(before[:3], abs=1e-3)
+    assert fastest <= 1.1 * CONFIG.teleoperation.joint_speed
+
+
+@pytest.mark.parametrize(
+    ("joint", "angle", "code"), [(4, 0.5, "posture_out_of_range"), (1, -9.0, None), (2, 1.7, "posture_touches")]
+)
+def test_a_posture_that_the_arm_cannot_take_moves_nothing_and_says_why(joint, angle, code):
+    r = robot()
+    goal = list(CONFIG.work.home)
+    goal[joint - 1] = angle
+    if code is None:
+        with pytest.raises(msgspec.ValidationError):
+            msgspec.convert({"angles": goal, "user": "ada"}, intents.CheckPosture)
+        return
+    before = r.q.copy()
+    answer = r.ask(intents.CheckPosture(user="ada", angles=tuple(goal)))
+    assert not answer.ok and answer.reason.code == code
+    lead(r, posture=tuple(goal))
+    r.run(0.5)
+    assert r.q == pytest.approx(before, abs=1e-6) and r.state.mode == "READY"
+    assert any(text_of(answer.reason) in event for event in r.events)
+
+
+def test_a_posture_beside_wood_is_refused_and_one_in_the_open_is_not():
+    r = robot()
+    assert r.ask(intents.CheckPosture(user="ada", angles=CONFIG.work.home)).ok
+    here = tool(r).translation
+    r.obstacles = (Capsule("post", (here[0], here[1], 0.0), (here[0], here[1], 2.0), 0.04, 0.04),)
+    r.run(0.2)
+    answer = r.ask(intents.CheckPosture(user="ada", angles=CONFIG.work.home))
+    assert not answer.ok and answer.reason.code == "posture_touches" and "post 0" in text_of(answer.reason)
+
+
+def test_the_programs_own_postures_can_be_taken_and_reached():
+    r = robot()
+    for posture in r.state.postures:
+        assert posture.user == "" and r.ask(intents.CheckPosture(user="ada", angles=posture.angles)).ok, posture.name
+    folded = next(each.angles for each in r.state.postures if each.name == "folded")
+    lead(r, posture=folded)
+    r.run(8.0)
+    assert r.q[5:] == pytest.approx(folded, abs=0.01)

@@ -13,7 +13,7 @@ from rolling_panda.reasons import said
 from tests.server.test_misuse import control
 from tests.server.test_page_socket import Page
 from tests.server.test_proxy import drawn
-from tests.support.fake_wire import FakeWire, bridge_state, controller_state, pruning_points, telling
+from tests.support.fake_wire import FakeWire, bridge_state, controller_state, pruning_point, pruning_points, telling
 from tests.support.running_server import eventually, running_server
 
 NAMES = ("rp1", "rp2")

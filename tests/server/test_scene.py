@@ -87,7 +87,7 @@ def test_what_the_blades_have_cut_off_falls_for_a_second_and_is_gone(scene: Draw
     scene.falling.step(100.2)
     assert piece.position[2] == pytest.approx(-0.5 * 9.81 * 0.04)
     scene.falling.step(100.8)
-    assert piece.position[2] == pytest.approx(-0.9), "it lies on the ground, and fades"
+    assert piece.position[2] == pytest.approx(-0.9, abs=0.008), "it lies on the ground, and fades"
     assert 0.0 < piece.opacity < 1.0
     scene.falling.step(101.0)
     assert falling(scene, "plant") is None

@@ -1,5 +1,8 @@
 """Base and joints by hand on the page: keys, the pad, a gamepad, and what ends each hold."""
 
+import math
+from typing import Any
+
 import msgspec
 import pytest
 from playwright.sync_api import Page, expect
@@ -7,6 +10,7 @@ from playwright.sync_api import Page, expect
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.messages import page as p
+from rolling_panda.messages.supervision import SavedPosture
 from rolling_panda.reasons import text_of
 from tests.support.played_page import box_of, until
 from tests.support.played_server import PlayedServer, controller
@@ -37,6 +41,11 @@ def newest(server: PlayedServer) -> p.Hold | None:
 def held(server: PlayedServer) -> bool:
     hold = newest(server)
     return hold is not None and hold.hold
+
+
+def said_as(why: m.Reason) -> dict[str, Any]:
+    """A reason as an answer of the server has it."""
+    return {"code": why.code, "values": dict(why.values)}
 
 
 def begin(page: Page, part: str) -> None:
@@ -102,7 +111,7 @@ def test_the_pad_drives_as_far_as_it_is_drawn_and_a_second_finger_ends_it(page: 
     x, y = middle(page, "#drive-pad")
     page.mouse.move(x, y)
     page.mouse.down()
-    page.mouse.move(x, y - 31)
+    page.mouse.move(x, y - 42)
     until(page, lambda: held(server) and newest(server).base.linear > 0.15)  # type: ignore[union-attr]
     page.mouse.move(x, y - 200)
     until(page, lambda: newest(server).base.linear == pytest.approx(0.4))  # type: ignore[union-attr]
@@ -202,14 +211,14 @@ def test_while_somebody_holds_the_page_says_what_is_near_and_what_holds_the_robo
     page.locator("h1").click()
     page.keyboard.down("h")
     until(page, lambda: held(server))
-    hint = page.locator("rp-teleoperation > .hint")
+    hint = page.locator(".drive-foot .hint")
     server.controller = controller("TELEOP", proximity=m.Proximity(0.048, "blades – wire 3"))
     expect(hint).to_have_text("48 mm between blades – wire 3.")
     server.controller = msgspec.structs.replace(server.controller, limited_by="joint 4")
     expect(hint).to_have_text("Held back by joint 4.")
     expect(hint).to_have_class("hint warned")
     page.keyboard.up("h")
-    expect(hint).to_contain_text("Drag the gizmo")
+    expect(hint).to_contain_text("drag the gizmo")
 
 
 def test_in_a_mode_without_teleoperation_every_button_says_why(page: Page, server: PlayedServer) -> None:
@@ -217,3 +226,148 @@ def test_in_a_mode_without_teleoperation_every_button_says_why(page: Page, serve
     server.controller = controller("PAUSED", allowed={"Teleoperation": why})
     expect(page.locator("#teleop")).to_have_attribute("title", text_of(why))
     expect(page.locator("rp-joints")).to_be_hidden()
+
+
+# --- arrows beside the gizmo -----------------------------------------------------------------------------------------
+
+
+def test_an_arrow_moves_the_tool_along_its_axis_while_it_is_held(page: Page, server: PlayedServer) -> None:
+    page.locator("#teleop").click()
+    page.get_by_role("button", name="world", exact=True).click()
+    up = page.locator('.arrows button[data-axis="z"][data-kind="move"][data-way="1"]')
+    expect(up).to_have_attribute("aria-label", "Move the tool forth: Up")
+    up.hover()
+    page.mouse.down()
+    until(page, lambda: held(server))
+    hold = newest(server)
+    assert hold is not None and hold.along is not None and hold.base is None and hold.joints is None
+    assert hold.along.axes == "world" and hold.along.linear[2] > 0.0 and hold.along.linear[:2] == (0.0, 0.0)
+    assert hold.along.angular == (0.0, 0.0, 0.0) and hold.along.duration_s is None
+    page.mouse.up()
+    until(page, lambda: not held(server))
+
+
+@pytest.mark.parametrize("ends", ["blur", "pointercancel", "hidden"])
+def test_whatever_ends_a_hold_ends_an_arrow_too(page: Page, server: PlayedServer, ends: str) -> None:
+    page.locator("#teleop").click()
+    arrow = page.locator('.arrows button[data-axis="x"][data-kind="turn"][data-way="-1"]')
+    arrow.hover()
+    page.mouse.down()
+    until(page, lambda: held(server))
+    if ends == "blur":
+        page.evaluate("window.dispatchEvent(new Event('blur'))")
+    elif ends == "hidden":
+        page.evaluate("Object.defineProperty(document, 'hidden', { get: () => true })")
+        page.evaluate("document.dispatchEvent(new Event('visibilitychange'))")
+    else:
+        arrow.dispatch_event("pointercancel", {"pointerId": 1})
+    until(page, lambda: not held(server))
+    count = len(holds(server))
+    page.wait_for_timeout(200)
+    assert len(holds(server)) == count, "the finger that is still down moves nothing"
+    page.mouse.up()
+
+
+def test_a_step_says_how_far_one_press_goes(page: Page, server: PlayedServer) -> None:
+    page.locator("#teleop").click()
+    page.get_by_role("button", name="10 mm", exact=True).click()
+    page.locator('.arrows button[data-axis="y"][data-kind="move"][data-way="-1"]').hover()
+    page.mouse.down()
+    until(page, lambda: held(server))
+    hold = newest(server)
+    assert hold is not None and hold.along is not None and hold.along.duration_s is not None
+    assert hold.along.linear[1] * hold.along.duration_s == pytest.approx(-0.01)
+    page.mouse.up()
+    until(page, lambda: not held(server))
+
+
+# --- angles to type, and postures ------------------------------------------------------------------------------------
+
+
+def state_with_postures(server: PlayedServer) -> None:
+    angles = (0.1, -0.2, 0.3, -2.0, 0.5, 1.2, 0.7)
+    own, saved = SavedPosture("survey", angles), SavedPosture("Over the wire", angles[::-1], "Ada")
+    server.controller = controller(postures=(own, saved))
+
+
+def test_a_typed_angle_is_reached_only_while_the_button_is_held(page: Page, server: PlayedServer) -> None:
+    begin(page, "Joints")
+    expect(page.locator("#go")).to_be_disabled()
+    page.locator(".joint .target").nth(3).fill("-90")
+    until(page, lambda: any(path == "/api/postures/check" for path, _ in server.posted))
+    expect(page.locator("#go")).to_have_text("Hold to go: Elbow -90°")
+    expect(page.locator("#go")).to_be_enabled()
+    assert holds(server) == [], "typing moves nothing"
+    shown = [message for message in server.said if isinstance(message, p.ShowPosture)][-1]
+    assert shown.angles is not None and shown.angles[3] == pytest.approx(-math.pi / 2)
+    page.locator("#go").hover()
+    page.mouse.down()
+    until(page, lambda: held(server))
+    hold = newest(server)
+    assert hold is not None and hold.posture is not None and hold.posture[3] == pytest.approx(-math.pi / 2)
+    page.mouse.up()
+    until(page, lambda: not held(server))
+    page.get_by_role("button", name="Base", exact=True).click()
+    until(page, lambda: server.said[-1] is not None and p.ShowPosture(angles=None) in server.said)
+
+
+@pytest.mark.parametrize(
+    ("typed", "words"), [("abc", "Not a number: "), ("1e999", "Not a number: "), ("400", "cannot turn to 400.0°")]
+)
+def test_what_is_no_angle_of_the_joint_is_refused_with_the_reason(
+    page: Page, server: PlayedServer, typed: str, words: str
+) -> None:
+    begin(page, "Joints")
+    page.locator(".joint .target").nth(1).fill(typed)
+    expect(page.locator(".drive-foot .hint")).to_contain_text(words)
+    expect(page.locator("#go")).to_be_disabled()
+    page.locator("#go").dispatch_event("pointerdown", {"button": 0, "pointerId": 1})
+    page.wait_for_timeout(200)
+    assert holds(server) == [] and not any(path == "/api/postures/check" for path, _ in server.posted)
+
+
+def test_a_posture_that_the_controller_refuses_is_not_gone_to(page: Page, server: PlayedServer) -> None:
+    why = reasons.posture_touches(3.0, "link6", "post 2", 15.0)
+    server.answers["/api/postures/check"] = 409, {"ok": False, "reason": text_of(why), **said_as(why)}
+    state_with_postures(server)
+    begin(page, "Postures")
+    page.get_by_role("button", name="Over the wire", exact=True).click()
+    expect(page.locator(".drive-foot .hint")).to_contain_text("3 mm would be between link6 and post 2")
+    expect(page.locator("#go")).to_be_disabled()
+    assert holds(server) == []
+
+
+def test_a_saved_posture_is_chosen_and_then_gone_to_while_held(page: Page, server: PlayedServer) -> None:
+    state_with_postures(server)
+    begin(page, "Postures")
+    page.get_by_role("button", name="Survey", exact=True).click()
+    expect(page.locator("#go")).to_have_text("Hold to go: Survey")
+    expect(page.locator("#go")).to_be_enabled()
+    assert holds(server) == []
+    page.locator("#go").hover()
+    page.mouse.down()
+    until(page, lambda: held(server))
+    hold = newest(server)
+    assert hold is not None and hold.posture == (0.1, -0.2, 0.3, -2.0, 0.5, 1.2, 0.7)
+    page.mouse.up()
+    until(page, lambda: not held(server))
+
+
+def test_the_present_posture_is_saved_and_others_deleted_but_not_the_programs_own(
+    page: Page, server: PlayedServer
+) -> None:
+    state_with_postures(server)
+    begin(page, "Postures")
+    expect(page.locator(".postures .delete")).to_have_count(1)
+    page.get_by_role("button", name="Delete Over the wire").click()
+    until(page, lambda: ("/api/postures/delete", {"posture": "Over the wire"}) in server.posted)
+    page.locator("#posture-name").fill("  Low  ")
+    page.locator("#save-posture").click()
+    until(page, lambda: ("/api/postures/save", {"posture": "Low"}) in server.posted)
+    expect(page.locator("#posture-name")).to_have_value("")
+    why = reasons.posture_name_taken("Low")
+    server.answers["/api/postures/save"] = 409, {"ok": False, "reason": text_of(why), **said_as(why)}
+    page.locator("#posture-name").fill("Low")
+    page.locator("#save-posture").click()
+    expect(page.locator("rp-toasts")).to_contain_text("There is a posture “Low” already")
+    expect(page.locator("#posture-name")).to_have_value("Low")

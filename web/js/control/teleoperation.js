@@ -9,10 +9,10 @@ import { whyNoTeleoperation } from "./allowed.js";
 import { isTyping } from "./stop.js";
 
 /** @typedef {import("../state/reasons.js").Reason} Reason */
-/** @typedef {"button"|"key"|"gizmo"|"drive"|"pad"|"gamepad"|"joint"} HoldSource */
+/** @typedef {"button"|"key"|"gizmo"|"drive"|"pad"|"gamepad"|"joint"|"arrow"|"posture"} HoldSource */
 /**
- * @typedef {{ base?: import("../link/messages.js").BaseVelocity, joints?: import("../link/messages.js").ArmVelocities
- * }} Wanted
+ * @typedef {{ base?: import("../link/messages.js").BaseVelocity, joints?: import("../link/messages.js").ArmVelocities,
+ *   along?: import("../link/messages.js").ToolVelocity, posture?: import("../link/messages.js").ArmAngles }} Wanted
  */
 
 const PERIOD_MS = 50;
@@ -42,7 +42,7 @@ class HoldToMove {
    * Start holding. A refused press stays without effect, so that the robot never starts moving later.
    *
    * @param {HoldSource} source
-   * @param {() => Wanted} [wanted] Velocities of base or joints; by default the tool follows the gizmo.
+   * @param {() => Wanted} [wanted] The motion; by default the tool follows the gizmo.
    * @returns {Reason|null} Why it was refused; null if accepted.
    */
   press(source, wanted = () => ({})) {
@@ -86,12 +86,14 @@ class HoldToMove {
   /** @param {boolean} hold */
   tell(hold) {
     this.sequence += 1;
-    const { base = null, joints = null } = hold ? this.wanted() : {};
-    this.send({ type: "Hold", sequence: this.sequence, hold, base, joints, speed_scale: this.speedScale.get() });
+    const { base = null, joints = null, along = null, posture = null } = hold ? this.wanted() : {};
+    const speed_scale = this.speedScale.get();
+    this.send({ type: "Hold", sequence: this.sequence, hold, base, joints, along, posture, speed_scale });
   }
 }
 
-/** @typedef {"tool"|"base"|"joints"} Part */
+export const PARTS = Object.freeze(/** @type {const} */ (["tool", "base", "joints", "postures"]));
+/** @typedef {(typeof PARTS)[number]} Part */
 
 export const teleoperating = signal(false);
 export const moving = signal(/** @type {Part} */ ("tool"));
@@ -155,9 +157,7 @@ export function initTeleoperation() {
   });
   window.addEventListener("pagehide", () => hold.releaseAll());
   window.addEventListener("blur", () => {
-    hold.release("button");
-    hold.release("key");
-    hold.release("joint");
+    for (const source of /** @type {const} */ (["button", "key", "joint", "arrow", "posture"])) hold.release(source);
   });
   listenForHoldKey(window);
 }

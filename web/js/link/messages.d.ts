@@ -53,17 +53,19 @@ export type Process = "bridge"|"controller"|"perception"|"server";
 
 export type Role = "viewer"|"operator"|"supervisor";
 
+export type ArmAngles = [number, number, number, number, number, number, number];
+
 export type PlanState = "none"|"planning"|"valid"|"void";
 
 export type PreviewPhase = "none"|"waiting"|"rolling"|"ready"|"approved"|"expired";
 
 export type ArmVelocities = [number, number, number, number, number, number, number];
 
+export type GizmoAxes = "tool"|"base"|"world";
+
 export type QuatXyzw = [number, number, number, number];
 
 export type Severity = "info"|"warning"|"error";
-
-export type GizmoAxes = "tool"|"base"|"world";
 
 export type CameraPreset = "follow"|"row"|"tool"|"top";
 
@@ -187,6 +189,16 @@ export interface QueueOrder {
   user: string;
 }
 
+/** A posture of the arm with a name. */
+export interface SavedPosture {
+  /** Name, as text; of a posture of the program `survey` or `folded`. */
+  name: string;
+  /** Angles of the joints (7, rad). */
+  angles: ArmAngles;
+  /** The person who saved it; empty for a posture of the program. */
+  user: string;
+}
+
 /** Controller → all: mode, queue and tracking error. */
 export interface ControllerState {
   type: "ControllerState";
@@ -236,6 +248,8 @@ export interface ControllerState {
   interrupted: Interrupted;
   /** Safety limits that its configuration sets less strictly than usual, within their hard bounds. */
   relaxed_limits: Reason[];
+  /** Postures that the arm can be led to: those of the program, then the saved ones. */
+  postures: SavedPosture[];
 }
 
 /** Messages of a topic that were refused for one reason. */
@@ -654,7 +668,19 @@ export interface BaseVelocity {
   angular: number;
 }
 
-/** 20 Hz while the operator holds a control. Without `base` and `joints` the tool follows the gizmo. */
+/** Velocity of the tool along and about the axes of a frame, as these were when the hold began. */
+export interface ToolVelocity {
+  /** Along x, y and z (m/s). */
+  linear: [number, number, number];
+  /** About x, y and z, at the tool (rad/s). */
+  angular: [number, number, number];
+  /** Frame of the axes. */
+  axes: GizmoAxes;
+  /** The motion ends after so long at full speed (s), a step; without it only the hold ends it. */
+  duration_s: number|null;
+}
+
+/** 20 Hz while the operator holds a control. Without any of the four motions the tool follows the gizmo. */
 export interface Hold {
   type: "Hold";
   /** Increases by one with each message. */
@@ -665,6 +691,10 @@ export interface Hold {
   base?: BaseVelocity|null;
   /** Velocities of the arm's joints (7, rad/s). */
   joints?: ArmVelocities|null;
+  /** Velocity of the tool. */
+  along?: ToolVelocity|null;
+  /** Angles of the arm's joints to go to (7, rad). */
+  posture?: ArmAngles|null;
   /** Fraction of the usual speed. */
   speed_scale?: number;
 }
@@ -711,6 +741,13 @@ export interface ShowPreview {
   type: "ShowPreview";
   /** Time from the start of the preview (s); None hides it. */
   time: number|null;
+}
+
+/** Show the arm in another posture, see-through, in this session's 3-D views. */
+export interface ShowPosture {
+  type: "ShowPosture";
+  /** Angles of the arm's joints (7, rad); None hides it. */
+  angles: ArmAngles|null;
 }
 
 /** Highlight a point in the 3-D view and move this session's cameras there. */
@@ -916,4 +953,4 @@ export interface Diagnostics {
 
 export type FromServer = PageState|PagePoints|PagePreview|PageEvents|Selected|PickRay|Measured|HoldEnded|Pong;
 
-export type FromPage = Ping|Hold|ShowGizmo|PlaceByHand|PlaceCamera|ShowLayers|Measure|ShowPreview|Select;
+export type FromPage = Ping|Hold|ShowGizmo|PlaceByHand|PlaceCamera|ShowLayers|Measure|ShowPreview|ShowPosture|Select;

@@ -1,0 +1,127 @@
+"""Saved postures of the arm: named by people, kept in the ledger, and checked before the arm goes to one."""
+
+import numpy as np
+
+from controller.config import WholeBodyConfig, WorkConfig
+from controller.ledger.journal import Journal, PostureRow
+from controller.motion.body import Body
+from controller.motion.surroundings import Surroundings
+from controller.whole_body.collision import CollisionModel
+from rolling_panda import commands as intents
+from rolling_panda import reasons
+from rolling_panda.commands import Handlers
+from rolling_panda.messages.perception import Obstacles
+from rolling_panda.messages.supervision import ArmAngles, SavedPosture
+from rolling_panda.messages.types import Reason
+from rolling_panda.model.differential_drive import Array
+from rolling_panda.model.robot import ARM_Q, RobotModel
+from rolling_panda.transport.inbox import Received
+
+#: Most saved postures: every state of the controller lists them. Longest name.
+MOST, LONGEST = 20, 40
+
+
+class PostureCheck:
+    """Whether the arm can be in a posture where the base stands. It has its own robot model."""
+
+    def __init__(self, robot: RobotModel, config: WholeBodyConfig) -> None:
+        """Nothing is known to stand around yet."""
+        self._settings = config.hierarchy
+        limits = robot.limits
+        self._low = limits.lower[ARM_Q] + config.joint_margin
+        self._high = limits.upper[ARM_Q] - config.joint_margin
+        self._surroundings = Surroundings(CollisionModel(robot))
+
+    def update(self, obstacles: Received[Obstacles] | None) -> None:
+        """Take the newest message; one that was taken before costs nothing."""
+        self._surroundings.update(obstacles)
+
+    def refusal(self, posture: Array, q: Array) -> Reason | None:
+        """Why the arm cannot go to a posture; None if it can.
+
+        Args:
+            posture: Of the arm (7, rad).
+            q: Where the robot is (12).
+        """
+        for joint, (angle, low, high) in enumerate(zip(posture, self._low, self._high, strict=True), 1):
+            if not low <= angle <= high:
+                return reasons.posture_out_of_range(joint, *(float(np.degrees(each)) for each in (angle, low, high)))
+        there = q.copy()
+        there[ARM_Q] = posture
+        settings = self._settings
+        near = self._surroundings.model.distances(there, settings.collision_distance)
+        for distance, pair in zip(near.distance.tolist(), near.pairs, strict=True):
+            if distance < settings.kept(pair):
+                return reasons.posture_touches(1e3 * distance, *pair, 1e3 * settings.kept(pair))
+        return None
+
+
+class Postures:
+    """The saved postures. Those of the program come first and stay."""
+
+    def __init__(self, config: WorkConfig, body: Body, check: PostureCheck, journal: Journal) -> None:
+        """Only the program's own are known; later ones are recorded in `journal`."""
+        self._body, self._check, self._journal = body, check, journal
+        self._own = (SavedPosture("survey", config.home), SavedPosture("folded", config.folded))
+        self._saved: dict[str, SavedPosture] = {}
+        self.all = self._own
+
+    def handlers(self) -> Handlers:
+        """The handler of each command about postures."""
+        return {
+            intents.SavePosture: lambda asked, _: self.save(asked.posture, asked.user),
+            intents.DeletePosture: lambda asked, _: self.delete(asked.posture, asked.user),
+            intents.CheckPosture: lambda asked, _: self.check(asked.angles),
+        }
+
+    def restore(self, rows: tuple[tuple[str, PostureRow], ...]) -> None:
+        """Restore the state of an earlier start."""
+        for name, row in rows:
+            self._put(name, row)
+
+    def save(self, name: str, user: str) -> Reason | None:
+        """Save the measured posture under a name. Returns the reason of a refusal; None if done."""
+        name, measured = name.strip(), self._body.measured
+        if not name:
+            return reasons.posture_name_empty()
+        if len(name) > LONGEST:
+            return reasons.posture_name_long(len(name), LONGEST)
+        if name.casefold() in {each.name.casefold() for each in self.all}:
+            return reasons.posture_name_taken(name)
+        if len(self._saved) >= MOST:
+            return reasons.postures_full(MOST)
+        if measured is None:
+            return reasons.posture_unmeasured()
+        row = PostureRow(angles=_rounded(measured.q[ARM_Q]), user=user)
+        self._put(name, row)
+        self._journal.add("posture", name, row)
+        return None
+
+    def delete(self, name: str, user: str) -> Reason | None:
+        """Delete a saved posture. Returns the reason of a refusal; None if done."""
+        if name not in self._saved:
+            return reasons.posture_not_saved(name)
+        row = PostureRow(angles=None, user=user)
+        self._put(name, row)
+        self._journal.add("posture", name, row)
+        return None
+
+    def check(self, angles: ArmAngles) -> Reason | None:
+        """Why the arm cannot go there from where the robot is; None if it can."""
+        measured = self._body.measured
+        if measured is None:
+            return reasons.posture_unmeasured()
+        return self._check.refusal(np.array(angles), measured.q)
+
+    def _put(self, name: str, row: PostureRow) -> None:
+        if row.angles is None:
+            self._saved.pop(name, None)
+        else:
+            self._saved[name] = SavedPosture(name, row.angles, row.user)
+        self.all = (*self._own, *self._saved.values())
+
+
+def _rounded(angles: Array) -> ArmAngles:
+    """To 0.0001 rad: every state lists them."""
+    a, b, c, d, e, f, g = np.round(angles, 4).tolist()
+    return (a, b, c, d, e, f, g)
