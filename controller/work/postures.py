@@ -64,7 +64,7 @@ class Postures:
         self._body, self._check, self._journal = body, check, journal
         self._own = (SavedPosture("survey", config.home), SavedPosture("folded", config.folded))
         self._saved: dict[str, SavedPosture] = {}
-        self.all = self._own
+        self.all: tuple[SavedPosture, ...] = self._own
 
     def handlers(self) -> Handlers:
         """The handler of each command about postures."""

@@ -69,7 +69,6 @@ function jointRow(joint, range) {
   const unknown = text("joint.unknown", { joint: number });
   const scale = element("div", { class: "scale", attributes: { role: "img", "aria-label": unknown } }, needle);
   const angle = element("output", { class: "number" });
-  const spare = element("span", { class: "spare" });
   const target = element("input", {
     class: "target",
     attributes: {
@@ -97,8 +96,8 @@ function jointRow(joint, range) {
       aim(goalName, angles);
     }
   });
-  const title = element("span", { class: "joint-name" }, element("b", { text: name }), element("small", { text: String(number) }));
-  const node = element("div", { class: "joint" }, title, angle, spare, down, scale, up, target);
+  const words = element("span", { class: "joint-words" }, name, element("small", { text: String(number) }), angle);
+  const node = element("div", { class: "joint" }, words, down, scale, up, target);
   return {
     node,
     typed: () => target.value !== "",
@@ -122,8 +121,7 @@ function jointRow(joint, range) {
       const [from, to, rest] = [low, high, left].map((each) => (each * DEGREE).toFixed(0));
       scale.ariaLabel = text("joint.at", { joint: number, angle: (at * DEGREE).toFixed(0), from, to });
       scale.title = near ? text("joint.near", { from, to, left: rest }) : text("joint.range", { from, to });
-      setText(spare, text("joint.spare", { left: rest }));
-      spare.classList.toggle("near", near);
+      angle.classList.toggle("near", near);
     },
   };
 }
