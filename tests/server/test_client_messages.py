@@ -12,7 +12,7 @@ CAMERA = {
     "far": 100, "image_height": 800, "image_width": 1280, "look_at": [0, 0, 0], "up_direction": [0, 0, 1],
 }  # fmt: skip
 CLICK = {
-    "type": "SceneNodeClickMessage", "name": "/points/p1", "instance_index": None, "ray_origin": [0, 0, 0],
+    "type": "SceneNodeClickMessage", "name": "/markers/proposed/tint", "instance_index": 0, "ray_origin": [0, 0, 0],
     "ray_direction": [1, 0, 0], "screen_pos": [0.5, 0.5], "modifier": None, "owner": "",
 }  # fmt: skip
 DRAG = {

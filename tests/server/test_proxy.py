@@ -115,13 +115,19 @@ def test_every_movement_is_shown_and_nothing_is_sent_at_rest(server):
         for step in range(1, 11):
             server.wire.deliver(topics.ODOMETRY, odometry(sequence=step, x=0.01 * step))
             moved = [message for message in hear(view, places_robot) if message["type"].startswith("Set")]
-            assert {message["name"] for message in moved} - {"/trail/line"} == {"/robot"}
+            assert {message["name"] for message in moved} - {"/trail/dots"} == {"/robot"}
             (robot,) = [message for message in moved if message["name"] == "/robot" and "position" in message]
             assert robot["position"][0] == pytest.approx(0.01 * step)
 
 
 def places_robot(message):
     return message["type"] == "SetPositionMessage" and message["name"] == "/robot"
+
+
+def marker_owner(view):
+    """What viser calls the view that a marker is drawn for, once it is drawn; a click on it says so."""
+    heard = hear(view, lambda message: message.get("name") == "/markers/proposed/tint")
+    return next(message["owner"] for message in heard if message.get("name") == "/markers/proposed/tint")
 
 
 def test_a_click_on_a_point_selects_it_on_the_pages_of_that_session_alone(server):
@@ -134,9 +140,9 @@ def test_a_click_on_a_point_selects_it_on_the_pages_of_that_session_alone(server
     ):
         hear(view, replayed)
         say(view, CAMERA)
-        say(view, CLICK)
+        say(view, CLICK | {"owner": marker_owner(view)})
         assert hear_kind(page, "Selected")["point_id"] == "p1"
-        hear(view, lambda message: message.get("name") == "/selection")
+        hear(view, lambda message: message.get("name") == "/markers/halo")
         kinds = [json.loads(other_page.recv(timeout=PATIENCE_S))["type"] for _ in range(5)]
         assert "Selected" not in kinds
 

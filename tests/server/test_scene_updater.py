@@ -59,8 +59,8 @@ def test_layers_are_those_of_one_session_and_stay_for_its_next_view(server):
             say(view, CAMERA)
             hear(view, shows("/plant", True))
             page.send('{"type":"ShowLayers","layers":["trail"]}')
-            heard = hear(view, shows("/plant", False))
-            assert any(map(shows("/trail", True), heard))
+            heard = hear(view, shows("/trail", True))
+            assert any(map(shows("/plant", False), heard))
             never(other_view, shows("/plant", False))
         with server.socket(client, "/viser") as view:
             hear(view, replayed)
@@ -92,9 +92,10 @@ def test_a_chosen_point_brings_the_cameras_of_who_chose_it_alone(server):
         page.send('{"type":"Select","point_id":"new"}')
         new = msgspec.structs.replace(pruning_point("new"), position=(2.0, 0.75, 1.0))
         server.wire.deliver(topics.POINTS, pruning_points(far, new))
-        hear(view, looks_at(2.0))
+        heard = hear(view, looks_at(2.0))
         # A click onto its marker does the same, and tells the page.
-        say(view, CLICK | {"name": "/markers/proposed/tint", "instance_index": 0})
+        owner = next(told["owner"] for told in heard if told.get("name") == "/markers/proposed/tint")
+        say(view, CLICK | {"owner": owner})
         assert hear_kind(page, "Selected")["point_id"] == "far"
         never(other_view, placed)
 
