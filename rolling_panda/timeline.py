@@ -4,11 +4,13 @@ from collections import deque
 from typing import Final, Literal, get_args
 
 from rolling_panda.messages.supervision import TIMELINE_EVENTS, Timeline, TimelineEvent
-from rolling_panda.messages.types import LogEvent, Mode
+from rolling_panda.messages.types import LogEvent, Mode, Reason
 
 _MODES: Final = {mode: mode for mode in get_args(Mode)}
 _MODE = ("mode_changed", "robot_halted")
 _CUT: Final[dict[str, Literal["cut", "failed_cut"]]] = {"cut_done": "cut", "cut_ended": "failed_cut"}
+#: What the cutter itself reports; a close-up may decide otherwise.
+_BY_CUTTER = ("cutter_cut", "cutter_missed", "cutter_unsure")
 _REFUSAL = ("command_refused", "teleoperation_refused")
 
 
@@ -19,15 +21,30 @@ class TimelineBuilder:
         """Nothing has happened."""
         self._events: deque[TimelineEvent] = deque(maxlen=TIMELINE_EVENTS)
         self._count = 0
+        #: By point: the cutter's report on its last cut, until the close-up has decided.
+        self._reports: dict[str, TimelineEvent] = {}
 
     def add(self, at: float, line: LogEvent) -> bool:
         """Add a line with its time (s since 1970). Returns whether it is an event of the timeline."""
         event = event_of(at, line)
         if event is None:
             return False
+        if line.reason.code in _CUT:
+            self._supersede(event)
         self._events.append(event)
         self._count += 1
         return True
+
+    def _supersede(self, event: TimelineEvent) -> None:
+        """A cut is one event, though the cutter reports it before the close-up decides."""
+        values = dict(event.reason.values)
+        point, outcome = str(values.get("point")), values.get("outcome")
+        earlier = self._reports.pop(point, None)
+        if isinstance(outcome, Reason) and outcome.code in _BY_CUTTER:
+            self._reports[point] = event
+        elif earlier is not None and earlier in self._events:
+            self._events.remove(earlier)
+            self._count -= 1
 
     def timeline(self, began_at: float, ended_at: float) -> Timeline:
         """Everything up to now, of a session between these times (s since 1970)."""

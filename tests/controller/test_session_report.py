@@ -92,6 +92,30 @@ def test_the_timeline_tells_modes_cuts_and_refusals_and_no_other_line():
     assert (told.began_at, told.ended_at) == (BEGAN, BEGAN + 9.0)
 
 
+def test_a_cut_is_one_event_though_the_cutter_reports_it_before_the_close_up_decides():
+    builder = SessionReportBuilder()
+    lines = (
+        reasons.cut_done("a", reasons.cutter_cut()),
+        reasons.cut_done("b", reasons.cutter_cut()),
+        reasons.cut_done("a", reasons.cut_and_gone()),
+        reasons.cut_ended("b", reasons.stands_unknown(reasons.cutter_cut())),
+        # Without a close-up the cutter's report is all there is.
+        reasons.cut_ended("c", reasons.cutter_missed()),
+        # A second cut of a point is another event.
+        reasons.cut_done("a", reasons.cutter_cut()),
+    )
+    for n, reason in enumerate(lines):
+        builder.add(at(float(n)), line("controller", reason))
+    told = builder.timeline()
+    assert [(round(each.at - BEGAN, 3), each.kind) for each in told.events] == [
+        (2.0, "cut"),
+        (3.0, "failed_cut"),
+        (4.0, "failed_cut"),
+        (5.0, "cut"),
+    ]
+    assert told.left_out == 0
+
+
 def test_a_long_session_keeps_its_newest_events_and_counts_the_others():
     builder = SessionReportBuilder()
     for n in range(520):

@@ -40,7 +40,11 @@ function prepareCanvas(canvas) {
   const style = getComputedStyle(canvas);
   pen.font = `13px ${style.fontFamily}`;
   /** @param {string} name */
-  const colour = (name) => style.getPropertyValue(`--${name}`).trim();
+  const colour = (name) => {
+    // The value of the property may be a function of the colour scheme, which a canvas does not know.
+    canvas.style.setProperty("color", `var(--${name})`);
+    return style.color;
+  };
   return { pen, width, height, colour };
 }
 
