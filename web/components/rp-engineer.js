@@ -36,7 +36,7 @@ class RpEngineer extends HTMLElement {
   hiddenOnes = element("div", { class: "hidden-panels" });
 
   connectedCallback() {
-    const reset = element("button", { id: "reset-panels", class: "quiet", text: text("panels.reset"), onclick: resetPanels });
+    const reset = element("button", { id: "reset-panels", class: "quiet", text: text("panels.reset"), onclick: () => this.reset() });
     const tools = element("div", { class: "panel-tools", attributes: { role: "group", "aria-label": text("panels.label") } }, this.hiddenOnes, reset);
     this.replaceChildren(tools);
     /** @type {Readonly<Record<PanelName, readonly Node[]>>} */
@@ -105,6 +105,11 @@ class RpEngineer extends HTMLElement {
     const next = button(panel, pressed);
     (next.hidden ? button(panel, other) : next).focus();
     panel.scrollIntoView({ block: "nearest" });
+  }
+
+  reset() {
+    resetPanels();
+    this.arrange();
   }
 
   /** @param {PanelName} name */
