@@ -1,5 +1,4 @@
-// What a point or a place is to a person: six signs, each with its shape and colour. The 3-D view has the same shapes
-// (`server/scene/marker_shapes.py`).
+// What a point or a place is to a person: six signs, each with its shape and colour.
 
 import { setAttribute, svg } from "./dom.js";
 
