@@ -33,6 +33,8 @@ from rolling_panda.messages.perception import (
 _MIN_WIDTH, _MAX_WIDTH, _RATIO = 240, 640, 4 / 3
 #: Length of cane from its base that the picture shows (m), and the margin around it (share of the width).
 _SHOWN_LENGTH, _MARGIN = 0.22, 0.12
+#: Length beyond a cut that is shown (m): of what falls.
+_BEYOND = 0.06
 _JPEG_QUALITIES = (92, 85, 70, 50)
 #: A view replaces another one if its distance, with the offset from the centre, is smaller by this factor.
 _BETTER = 0.8
@@ -181,7 +183,12 @@ def _shows(image: _Image, points: Sequence[PruningPoint]) -> bool:
 
 def _window(view: View, spur: KnownSpur, points: Sequence[PruningPoint]) -> _Window:
     """The part of a view that shows a spur, the beginning of its canes and its cuts."""
-    content = [spur.position.mean[None], *(np.array([point.position]) for point in points)]
+    beyond = [np.array(point.position) + _BEYOND * np.array(point.tangent) for point in points]
+    content = [
+        spur.position.mean[None],
+        *(np.array([point.position]) for point in points),
+        *(at[None] for at in beyond),
+    ]
     if spur.best.axis is not None:
         content.append(spur.best.axis)
     content += [cane.best.axis[cane.best.arc <= _SHOWN_LENGTH] for cane in spur.canes]
