@@ -2,7 +2,7 @@
 
 import { move, whyNotMove } from "../js/control/decisions.js";
 import { turnApproach, whyNotTurn } from "../js/control/order.js";
-import { newtons, uncertainty } from "../js/state/format.js";
+import { decimal, newtons, uncertainty } from "../js/state/format.js";
 import { reason } from "../js/state/reasons.js";
 import { text } from "../js/state/texts.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
@@ -34,14 +34,14 @@ function cutWords(point) {
 
 /** @param {PruningPoint} point */
 function caneWords(point) {
-  const thick = `${(2000 * point.radius).toFixed(1)} mm`;
+  const thick = `${decimal(2000 * point.radius, 1)} mm`;
   return point.force > 0 ? `${thick}, ≈ ${newtons(point.force)}` : thick;
 }
 
 /** @param {PruningPoint} point */
 function placeWords(point) {
   if (point.position_covariance === null) return "–";
-  const place = `± ${(1000 * uncertainty(point.position_covariance)).toFixed(1)} mm`;
+  const place = `± ${decimal(1000 * uncertainty(point.position_covariance), 1)} mm`;
   if (point.tangent_covariance === null) return place;
   return `${place}, ± ${((180 / Math.PI) * uncertainty(point.tangent_covariance)).toFixed(0)}°`;
 }

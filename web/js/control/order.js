@@ -1,7 +1,7 @@
 // The order of work: its points, who set it, and changing it.
 
 import { ask } from "../link/api.js";
-import { durationWords } from "../state/format.js";
+import { decimal, durationWords } from "../state/format.js";
 import { pageState, points } from "../state/page-state.js";
 import { counted, text } from "../state/texts.js";
 import { countOf, whyNot, whyNotPoint } from "./allowed.js";
@@ -34,7 +34,7 @@ export function orderWords() {
 
 /** Time that a planned cut takes; empty until it is rolled out. @param {PointPlan} plan */
 export function cutTime({ rollout }) {
-  return rollout ? `${(rollout.ends_s - rollout.begins_s).toFixed(1)} s` : "";
+  return rollout ? `${decimal(rollout.ends_s - rollout.begins_s, 1)} s` : "";
 }
 
 /** Why the order cannot be changed. */

@@ -1,6 +1,7 @@
 // Where the robot stands for a cut, and what the plan says of it, in words.
 
 import { cutTime } from "../control/order.js";
+import { decimal } from "../state/format.js";
 import { labelOf, text } from "../state/texts.js";
 
 /** @typedef {import("../link/messages.js").PagePoint} PagePoint */
@@ -13,8 +14,8 @@ export function robotWords({ point, plan }) {
   const left = -Math.sin(base.phi) * dx + Math.cos(base.phi) * dy;
   const ahead = Math.cos(base.phi) * dx + Math.sin(base.phi) * dy;
   return text(`plan.stands.${left > 0 ? "left" : "right"}.${ahead >= 0 ? "ahead" : "behind"}`, {
-    aside: Math.abs(left).toFixed(1),
-    ahead: Math.abs(ahead).toFixed(1),
+    aside: decimal(Math.abs(left), 1),
+    ahead: decimal(Math.abs(ahead), 1),
   });
 }
 
