@@ -38,7 +38,6 @@ _PATIENCE_MS = 60_000
 
 #: Played states: what of the page is shown. All of it where nothing is said.
 PARTS = {
-    "no-points": "rp-work",
     "survey": "rp-bar",
     "viewer": "rp-bar",
     "paused": "rp-alarms, rp-bar",
@@ -70,6 +69,8 @@ class Album:
     def take(self, page: Any, name: str, part: str = "") -> None:
         """Keep the page as `name`; with `part`, a selector, only the least box that holds all that it finds."""
         clip = page.evaluate(_BOX, part) if part else None
+        if clip is not None and clip["width"] is None:
+            raise InputError(f"{name}: nothing of {part} is to be seen on the page")
         picture = Image.open(BytesIO(page.screenshot(clip=clip))).convert("RGB")
         small = picture.quantize(COLOURS, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
         small.save(self.folder / f"{name}.png", optimize=True)
@@ -90,7 +91,7 @@ _BOX = """part => {
   const y = Math.max(0, Math.min(...boxes.map(box => box.top)) - 8);
   const right = Math.min(innerWidth, Math.max(...boxes.map(box => box.right)) + 8);
   const bottom = Math.min(innerHeight, Math.max(...boxes.map(box => box.bottom)) + 8);
-  return {x, y, width: right - x, height: bottom - y};
+  return {x, y, width: boxes.length ? right - x : null, height: bottom - y};
 }"""
 
 
@@ -115,7 +116,7 @@ def played(launch: Callable[[list[str]], Any], album: Album, only: Sequence[str]
         only: Names of those wanted; all where it is empty.
 
     Raises:
-        InputError: The tests are not here.
+        InputError: The tests are not here, or a part is not on the page.
     """
     if not (ROOT / "tests" / "support" / "page_states.py").exists():
         raise InputError(f"{ROOT / 'tests'} is not there: take the pictures in a checkout of the project")
