@@ -11,7 +11,7 @@ import { screen } from "../js/state/screens.js";
 import { drawOn } from "../js/state/signals.js";
 import { counted, labelOf, text } from "../js/state/texts.js";
 import { element, keepRows, setAttribute, setText } from "../js/views/dom.js";
-import { setIcon } from "../js/views/icons.js";
+import { setStatus, statusOf } from "../js/views/point-status.js";
 
 /** @typedef {import("../js/link/messages.js").PagePoint} PagePoint */
 
@@ -80,7 +80,7 @@ function theCut() {
     const { point, entry } = row;
     const all = cuts();
     of = point.point_id;
-    box.dataset.state = entry.state;
+    box.dataset.status = statusOf(entry.state);
     setText(count, text("work.count", { number: all.indexOf(row) + 1, count: all.length }));
     setText(name, text("work.place", { vine: point.vine, spur: point.spur }));
     setText(state, stateWords(row, controller?.phase ?? ""));
@@ -153,8 +153,10 @@ function cutRow(name) {
     item,
     /** @param {PagePoint} row */
     show({ point, entry }) {
+      const status = statusOf(entry.state);
       item.dataset.state = entry.state;
-      setIcon(shape, entry.state);
+      button.dataset.status = status;
+      setStatus(shape, status);
       setText(place, text("work.spur", { spur: point.spur }));
       setText(state, labelOf(entry.state));
       setAttribute(button, "aria-current", selected.get() === name ? "true" : "");
