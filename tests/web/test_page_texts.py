@@ -43,7 +43,7 @@ COLUMNS = (
 )
 PANELS = ("alarms", "processes", "telemetry", "charts", "log", "topics", "models")
 TOPIC_COLUMNS = ("topic", "sender", "rate", "nominal", "age", "count", "rejected")
-CHOICES = ("part.tool", "part.base", "part.joints", "axes.tool", "axes.base", "axes.world")
+CHOICES = ("part.tool", "part.base", "part.joints", "part.postures", "axes.tool", "axes.base", "axes.world")
 PARTS = {GROUND, *(part_of(shape.name) for shape in robot_geometry(RobotModel()).geometryObjects)}
 CONSTRAINTS = (
     *(*hierarchy._BOUND_NAMES, *axle._NAMES, *tipping._NAMES, NOT_FINITE),
@@ -56,6 +56,13 @@ SAID = (
 )
 #: What stands for `${…}` in a key.
 FAMILIES: dict[str, Sequence[str]] = {
+    "arrows.${}": ["move.up", "move.down", "turn.up", "turn.down"],
+    "arrows.${}.label": ["move.up", "move.down", "turn.up", "turn.down"],
+    "arrows.${}.${}": [f"{frame}.{axis}" for frame in ("tool", "base", "world") for axis in "xyz"],
+    "arrows.step.${}": ["free", "small", "middle", "large"],
+    "arrows.step.${}.hint": ["free", "small", "middle", "large"],
+    "joint.name.${}": [str(number) for number in range(1, 8)],
+    "posture.own.${}": ["survey", "folded"],
     "mode.${}": (*get_args(m.Mode), "none"),
     "point.${}": get_args(m.PointState),
     "phase.${}": tuple(filter(None, get_args(m.Phase))),
@@ -66,7 +73,7 @@ FAMILIES: dict[str, Sequence[str]] = {
     "camera.${}.hint": get_args(types.BridgeKind),
     "command.${}": (*(command.name for command in COMMANDS), HOLD),
     "command.${}.hint": BUTTONS,
-    "teleop.how.${}": ("tool", "base", "joints"),
+    "teleop.how.${}": ("tool", "base", "joints", "postures"),
     "telemetry.${}": ("low", "high", ""),
     "reading.${}": READINGS,
     "reading.${}.hint": READINGS,
@@ -196,7 +203,7 @@ SHOWN = re.compile(
 #: What is compared, styled or looked up instead of being shown.
 UNSEEN = re.compile(
     r"(?:class: |[!=]== |case |whyNot\(|querySelector(?:All)?\(|closest\??\.?\(|translate = |headers\.get\(|data: \{ |"
-    r'-controls": |name: |const PARTS = |const DISABLED = |getAttribute\()$'
+    r'-controls": |name: |cookie = |const PARTS = |const DISABLED = |getAttribute\()$'
 )
 PROPER = {"Rolling Panda", "\0 · Rolling Panda", "\0 min \0 s", "\0 min", "\0 s", "\0 mm", "\0 / \0 s"}
 KEYS = {"H", "Esc", "Escape", "Tab", "Enter", "Space", "Arrow"}

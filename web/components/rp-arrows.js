@@ -45,7 +45,7 @@ class RpArrows extends HTMLElement {
             () => hold.press("arrow", () => ({ along: { linear, angular, axes: axes.get(), duration_s: STEPS[step.get()] } })),
             () => hold.release("arrow"),
           );
-          buttons.push({ node, key: `arrows.${key}.label` });
+          buttons.push({ node, key });
           pair.append(node);
         }
         grid.append(pair);
@@ -65,7 +65,7 @@ class RpArrows extends HTMLElement {
       const why = hold.whyNot();
       for (const { node, axis } of names) setText(node, text(`arrows.${axes.get()}.${axis}`));
       for (const { node, key } of buttons) {
-        const words = text(key, { axis: text(`arrows.${axes.get()}.${node.dataset.axis}`) });
+        const words = text(`arrows.${key}.label`, { axis: text(`arrows.${axes.get()}.${node.dataset.axis}`) });
         setEnabled(node, why, words);
         setAttribute(node, "aria-label", words);
       }

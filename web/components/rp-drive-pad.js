@@ -70,9 +70,9 @@ customElements.define("rp-drive-pad", RpDrivePad);
 
 /** A gamepad from above: what is used is marked and named. */
 function gamepadPicture() {
-  const word = (/** @type {string} */ key, /** @type {Record<string, string|number>} */ where) => {
+  const word = (/** @type {string} */ words, /** @type {Record<string, string|number>} */ where) => {
     const node = svg("text", where);
-    node.textContent = text(key);
+    node.textContent = words;
     return node;
   };
   return svg(
@@ -85,7 +85,7 @@ function gamepadPicture() {
     svg("rect", { class: "used", x: 140, y: 26, width: 34, height: 14, rx: 6 }),
     svg("circle", { class: "used", cx: 86, cy: 66, r: 12 }),
     svg("circle", { cx: 152, cy: 66, r: 12 }),
-    word("drive.gamepad.hold", { x: 120, y: 16, "text-anchor": "middle" }),
-    word("drive.gamepad.steer", { x: 86, y: 116, "text-anchor": "middle" }),
+    word(text("drive.gamepad.hold"), { x: 120, y: 16, "text-anchor": "middle" }),
+    word(text("drive.gamepad.steer"), { x: 86, y: 116, "text-anchor": "middle" }),
   );
 }
