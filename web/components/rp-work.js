@@ -11,7 +11,8 @@ import { screen } from "../js/state/screens.js";
 import { drawOn } from "../js/state/signals.js";
 import { counted, labelOf, text } from "../js/state/texts.js";
 import { element, keepRows, setAttribute, setText } from "../js/views/dom.js";
-import { setStatus, statusOf } from "../js/views/point-status.js";
+import { statusOf } from "../js/state/point-status.js";
+import { setStatus } from "../js/views/point-status.js";
 
 /** @typedef {import("../js/link/messages.js").PagePoint} PagePoint */
 

@@ -1,15 +1,15 @@
 // The sequence in which a person decides: the points and the undecided places along the row, one at a time.
 
 import { points, selected } from "../state/page-state.js";
+import { statusOf } from "../state/point-status.js";
 import { signal } from "../state/signals.js";
 import { text } from "../state/texts.js";
-import { statusOf } from "../views/point-status.js";
 import { pushUndo } from "./decisions.js";
 import { isFollowed, selectAndReveal } from "./selection.js";
 
 /** @typedef {import("../link/messages.js").PagePoint} PagePoint */
 /** @typedef {import("../link/messages.js").UndecidedSite} UndecidedSite */
-/** @typedef {import("../views/point-status.js").Status} Status */
+/** @typedef {import("../state/point-status.js").Status} Status */
 /**
  * A point, or a place without one with all that is undecided there.
  *

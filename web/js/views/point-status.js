@@ -1,21 +1,8 @@
-// What a point or a place is to a person: six signs, each with its shape and colour.
+// The sign of each status of a point or a place: a shape and a colour.
 
 import { setAttribute, svg } from "./dom.js";
 
-/** @typedef {import("../link/messages.js").PointState} PointState */
-/** @typedef {"proposed"|"accepted"|"unreachable"|"done"|"decide"|"left"} Status */
-
-/** @type {Readonly<Record<PointState, Status>>} */
-const STATUS_OF = Object.freeze({
-  PROPOSED: "proposed",
-  ACCEPTED: "accepted",
-  CUTTING: "accepted",
-  UNREACHABLE: "unreachable",
-  DONE: "done",
-  FAILED_NOT_CUT: "decide",
-  UNKNOWN: "decide",
-  REJECTED: "left",
-});
+/** @typedef {import("../state/point-status.js").Status} Status */
 
 /** A body, which is filled with the colour, and a sign on it. @type {Readonly<Record<Status, readonly [string, string]>>} */
 const PATHS = Object.freeze({
@@ -26,11 +13,6 @@ const PATHS = Object.freeze({
   decide: ["M12 1.5L22.5 12L12 22.5L1.5 12z", "M9.6 9.6a2.5 2.5 0 1 1 3.4 2.3c-.7.3-1 .8-1 1.7M12 16.4v.2"],
   left: ["M5.5 4L12 10.5L18.5 4L20 5.5L13.5 12L20 18.5L18.5 20L12 13.5L5.5 20L4 18.5L10.5 12L4 5.5z", ""],
 });
-
-/** @param {PointState} state */
-export function statusOf(state) {
-  return STATUS_OF[state];
-}
 
 /**
  * Show a status in an element, if it is another one.
