@@ -1,5 +1,6 @@
 import json
 import re
+import shutil
 from typing import Annotated, Any
 
 import msgspec
@@ -27,6 +28,8 @@ def test_an_edited_file_is_noticed(tmp_path: Any) -> None:
         copy = tmp_path / path.relative_to(ROOT)
         copy.parent.mkdir(parents=True, exist_ok=True)
         copy.write_text(path.read_text(encoding="utf-8"), encoding="utf-8")
+    for path in (ROOT / "web" / "text").glob("*.json"):
+        shutil.copy(path, tmp_path / "web" / "text")
     assert stale(tmp_path) == []
     (tmp_path / "web" / "js" / "link" / "messages.js").write_text("// edited\n", encoding="utf-8")
     wire = tmp_path / "docs" / "wire.md"
