@@ -120,13 +120,6 @@ FAMILIES: dict[str, Sequence[str]] = {
         *("camera", "measure", "hold", "drive", "close", "help"),
     ),
     "hint.${}": ("next", "screens", "stop", "person"),
-    "arrows.${}": ("move.up", "move.down", "turn.up", "turn.down"),
-    "arrows.${}.label": ("move.up", "move.down", "turn.up", "turn.down"),
-    "arrows.${}.${}": tuple(f"{axes}.{axis}" for axes in ("base", "tool", "world") for axis in "xyz"),
-    "arrows.step.${}": ("free", "small", "middle", "large"),
-    "arrows.step.${}.hint": ("free", "small", "middle", "large"),
-    "joint.name.${}": tuple("1234567"),
-    "posture.own.${}": ("folded", "survey"),
     # What a message names.
     "name.${}": (
         *(event.value for event in Event),
