@@ -22,7 +22,7 @@ TEXTS = resource("web/text/page.en.json").parent
 #: A language that has no files of its own; here its words are the English ones in other letters.
 LANGUAGE = "eo"
 LETTERS = str.maketrans(
-    "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ", "αвсδεғgнιјκℓмηορqяѕтυνωχуzΑВСΔΕҒGНΙЈΚLМΗΟΡQЯЅТΥΝΩΧΥZ"
+    "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ", "αвсδεғցнιјκℓмηορqяѕтυνωχуzΑВСΔΕҒGНΙЈΚLМΗΟΡQЯЅТΥΝΩΧΥZ"
 )
 #: What is the same in every language: names, also of languages and keys, units and formats of files.
 SAME = {"English", "esperanto", "Esc", "nullspace", "Rolling", "Panda", "Ada", "Bob", "mm", "ms", "min", "JSON", "CSV"}
@@ -32,7 +32,9 @@ WORDS = """() => {
   const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
   while (walker.nextNode()) {
     const parent = walker.currentNode.parentElement;
-    if (parent.localName !== "noscript" && parent.checkVisibility({ visibilityProperty: true }))
+    // Names on the wire stay as they are.
+    const said = parent.localName !== "noscript" && !parent.closest('[translate="no"]');
+    if (said && parent.checkVisibility({ visibilityProperty: true }))
       shown.push(walker.currentNode.data);
   }
   const attributes = ["title", "placeholder", "alt", "aria-label", "aria-description", "aria-valuetext"];

@@ -251,8 +251,9 @@ function topicTable() {
 
 /** @param {TopicTraffic} topic */
 function newRow({ name, sender }) {
+  const from = sender === "any" ? text("process.all") : labelOf(sender);
   const cells = ["rate", "nominal", "age", "count", "rejected"].map(() => element("td", { class: "number" }));
-  const row = element("tr", { data: { topic: name } }, element("th", { text: name, attributes: { scope: "row" } }), element("td", { text: sender }), ...cells);
+  const row = element("tr", { data: { topic: name } }, element("th", { text: name, attributes: { scope: "row", translate: "no" } }), element("td", { text: from }), ...cells);
   return { row, cells };
 }
 
