@@ -12,9 +12,9 @@ from starlette.routing import Match, Mount
 from starlette.types import ASGIApp, Scope
 
 from rolling_panda import __version__, reasons
-from rolling_panda.messages.page import PageEvents, PagePoints, PageState
+from rolling_panda.messages.page import Diagnostics, PageEvents, PagePoints, PageState
 from rolling_panda.messages.perception import SpurDrawing
-from rolling_panda.messages.supervision import SessionPlan, SessionReport
+from rolling_panda.messages.supervision import SessionPlan, SessionReport, Timeline
 from rolling_panda.messages.types import Reason
 from rolling_panda.resources import resource
 from server.api.commands import Control, commands_router, control_router
@@ -42,7 +42,10 @@ _ABOUT = (
 
 
 #: Response types that are no Pydantic models.
-_MESSAGES = (PageState, PagePoints, PageEvents, SessionPlan, SessionReport, Previewed, Control, SpurDrawing)
+_MESSAGES = (
+    *(PageState, PagePoints, PageEvents, SessionPlan, SessionReport, Previewed, Control, SpurDrawing),
+    *(Diagnostics, Timeline),
+)
 
 
 class _Application(FastAPI):

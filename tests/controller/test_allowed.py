@@ -121,6 +121,12 @@ class World:
                 return [kind(**common, vine=each.vine, spur=each.spur) for each in self.sites]
             case intents.RestoreAccepted:
                 return [kind(**common, rule=self.rule)]
+            case intents.SavePosture:
+                names = {each.name for each in state.postures}
+                free = [name for name in map(str, range(20)) if name not in names]
+                return [kind(**common, posture=name) for name in free[:1]]
+            case intents.DeletePosture:
+                return [kind(**common, posture=each.name) for each in state.postures if each.user]
             case _:
                 return [example(kind)]
 

@@ -20,6 +20,7 @@ VALUES = {
     "point_id": "p1", "revision": 1, "vine": 1, "spur": 1, "reason": "-", "outcome": "DONE", "preview_hash": "0f",
     "required": True, "rule": PruningRule(), "origin": (0.0, 0.0, 0.0), "direction": (1.0, 0.0, 0.0), "sequence": 1,
     "u": 0.5, "v": 0.5, "along": 0.0, "wrong": True,
+    "posture": "over the row", "angles": ControllerConfig().work.home,
 }  # fmt: skip
 
 

@@ -216,7 +216,8 @@ def test_refusals_say_why_and_allowed_agrees_with_them():
     about_points = {"AcceptPoint", "RejectPoint", "ReconsiderPoint", "ResolvePoint", "JudgeCut"}
     about_points |= {"MoveInQueue", "SetApproach"}
     possible = {name for name, reason in r.state.allowed.items() if reason is None}
-    assert possible == {"Arm", "RequirePreview"} | about_points
+    postures = {"SavePosture", "DeletePosture", "CheckPosture"}
+    assert possible == {"Arm", "RequirePreview"} | postures | about_points
     told = {command.name for command in COMMANDS if command.process == "controller" and command.tag != "control"}
     assert set(r.state.allowed) == told | {"Teleoperation"}
     assert r.ask(intents.Arm(user="ada")).ok

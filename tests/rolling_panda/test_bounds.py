@@ -58,7 +58,7 @@ HARMLESS = {
     "whole_body.hierarchy.joint_centre whole_body.hierarchy.smoothness whole_body.hierarchy.good_manipulability "
     "whole_body.hierarchy.damping whole_body.hierarchy.damping_from whole_body.hierarchy.clock_rise "
     "whole_body.hierarchy.axle_rate",
-    "server": "scene_rate_hz log_lines",
+    "server": "scene_rate_hz log_lines cut_pictures",
 }
 
 

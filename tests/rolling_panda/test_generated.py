@@ -30,6 +30,8 @@ def test_an_edited_file_is_noticed(tmp_path: Any) -> None:
         copy.write_text(path.read_text(encoding="utf-8"), encoding="utf-8")
     for path in (ROOT / "web" / "text").glob("*.json"):
         shutil.copy(path, tmp_path / "web" / "text")
+    for path in (ROOT / "docs").glob("guide-short.*.md"):
+        shutil.copy(path, tmp_path / "docs")
     assert stale(tmp_path) == []
     (tmp_path / "web" / "js" / "link" / "messages.js").write_text("// edited\n", encoding="utf-8")
     wire = tmp_path / "docs" / "wire.md"

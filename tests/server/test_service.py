@@ -37,7 +37,7 @@ def context(*argv):
     parser = argparse.ArgumentParser()
     add_arguments(parser)
     parser.set_defaults(robot_id="rp1", config=resource("assets/config/sim.toml"), connect=None)
-    parser.set_defaults(certificates=None, plain_wire=False)
+    parser.set_defaults(certificates=None, plain_wire=False, state=None)
     return ProcessContext(parser.parse_args(argv), resource("assets/config/sim.toml"), FakeWire(), threading.Event())
 
 
@@ -46,8 +46,8 @@ def served(monkeypatch):
     """Instead of serving, hand over what would have been served."""
     seen = {}
 
-    async def serve(config, wires, sessions, listener, address, stopping, allowed, built):
-        seen.update(robots=list(wires), sessions=sessions, address=address, allowed=allowed)
+    async def serve(config, wires, sessions, listener, stopping, allowed, built, state):
+        seen.update(robots=list(wires), sessions=sessions, allowed=allowed, port=listener.getsockname()[1])
 
     monkeypatch.setattr(service, "serve", serve)
     return seen
@@ -66,7 +66,7 @@ def test_without_a_file_one_link_is_printed_and_works(served, capsys):
     service.run(context("--port", "0"))
     link = capsys.readouterr().out.split()[-1]
     address, token = link.split("/sign-in?token=")
-    assert address == served["address"]
+    assert address == f"http://127.0.0.1:{served['port']}"
     assert served["sessions"].sign_in(token, 0.0).role == "supervisor"
 
 

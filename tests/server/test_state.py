@@ -75,7 +75,7 @@ def test_the_timeline_is_given_as_the_controller_tells_it():
 
 def test_the_diagnostics_tell_versions_and_what_comes_in_of_each_topic():
     with running_server(FakeWire()) as server, server.client(role="viewer") as client:
-        began = time.monotonic()
+        began = time.monotonic() - 1.0
         for number in range(11):
             server.wire.deliver(topics.JOINTS, joints(), began + 0.01 * number)
         server.wire.deliver(topics.PROGRAM, m.Program(process="bridge", version="9.9", began_at=1769840000.0))

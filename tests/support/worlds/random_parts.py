@@ -114,7 +114,9 @@ class Movement:
         self.body = SimpleNamespace(robot=MODEL, measured=None, tracking_error=nothing, surroundings=nothing)
         self.sequence = Sequence(config, queue, run_id, self.chance, permit)
         follower = SimpleNamespace(jog=lambda xi, robot: SimpleNamespace(xi=np.clip(xi, -0.03, 0.03)))
-        self.teleoperation = Teleoperation(config.teleoperation, config.work, follower, MODEL.drive)
+        self.teleoperation = Teleoperation(
+            config.teleoperation, config.work, follower, MODEL.drive, 0.01, lambda *_: None
+        )
         self.tracking, self._home = None, 0
 
     @property
