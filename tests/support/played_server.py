@@ -146,7 +146,7 @@ class PlayedServer:
     diagnostics: page_messages.Diagnostics = field(default_factory=lambda: diagnostics())
     #: Pictures of cuts, by cut and moment.
     cut_pictures: dict[tuple[str, str], bytes] = field(default_factory=dict)
-    pictures_fetched: list[tuple[str, str]] = field(default_factory=list)
+    cut_pictures_fetched: list[tuple[str, str]] = field(default_factory=list)
     rule: m.PruningRule | None = field(default_factory=m.PruningRule)
     crop: bytes = field(default_factory=lambda: camera_image(SIZE))
     view: bytes = b""
@@ -184,7 +184,7 @@ class PlayedServer:
         if path.startswith("/api/cuts/"):
             _, _, _, cut_id, moment = path.removesuffix(".jpg").split("/")
             picture = self.cut_pictures.get((cut_id, moment))
-            self.pictures_fetched.append((cut_id, moment))
+            self.cut_pictures_fetched.append((cut_id, moment))
             return Response(picture, media_type="image/jpeg") if picture else Response(status_code=204)
         if path == "/viser/":
             return Response(STILL if self.view else self.frame, media_type="text/html")

@@ -59,7 +59,7 @@ def test_without_a_cut_it_says_so_everywhere(page: Page, server: PlayedServer) -
     for words in ("Nothing has been cut yet.", "Nothing is left for a person.", "Nothing was refused.", "No vine has"):
         expect(told).to_contain_text(words)
     assert sum_of(page, "vines_an_hour") == "–" and sum_of(page, "mean") == "–"
-    assert server.pictures_fetched == []
+    assert server.cut_pictures_fetched == []
 
 
 def test_a_cut_has_its_pictures_and_says_where_one_is_missing(page: Page, server: PlayedServer) -> None:
@@ -79,7 +79,7 @@ def test_a_cut_has_its_pictures_and_says_where_one_is_missing(page: Page, server
     expect(card("p2").locator(".no-picture")).to_have_text("No picture: none was taken, or it was not kept")
     expect(card("p3").locator(".no-picture")).to_have_text("Not cut yet")
     expect(card("p4").locator(".no-picture").first).to_have_text("No picture: it was given up before the cut")
-    assert ("c3", "after") not in server.pictures_fetched
+    assert ("c3", "after") not in server.cut_pictures_fetched
     expect(page.locator(".cut-card h4").first).to_have_text("Vine 1 · spur 4")
     # The picture after the cut that is being made comes with its outcome.
     server.cut_pictures["c3", "after"] = cut_picture(True)

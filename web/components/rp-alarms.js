@@ -40,7 +40,7 @@ const HALTS = new Set(["mode_paused", "work_waits"]);
 class RpAlarms extends HTMLElement {
   /** @type {Map<string, ReturnType<typeof newRow>>} */
   rows = new Map();
-  list = element("ul", { class: "alarm-list", attributes: { "aria-label": text("alarms.title") } });
+  list = element("ul", { class: "alarm-list", attributes: { "aria-label": text("alarms.title"), tabindex: "0" } });
 
   connectedCallback() {
     this.id = "alarms";
