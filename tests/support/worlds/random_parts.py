@@ -117,6 +117,7 @@ class Movement:
         self.teleoperation = Teleoperation(
             config.teleoperation, config.work, follower, MODEL.drive, 0.01, lambda *_: None
         )
+        self.posture_check = SimpleNamespace(refusal=lambda *_: None)
         self.tracking, self._home = None, 0
 
     @property
