@@ -23,6 +23,8 @@ _FLIGHT_S, USER_PRIORITY_S = 0.5, 8.0
 _NEAREST, _FARTHEST = 0.5, 1.0
 #: Default direction of a close-up: from behind the robot's shoulder, in the base's axes.
 _DEFAULT_OFFSET = np.array([-0.55, -0.75, 0.4])
+#: Vertical field of view of the first camera of a view (rad).
+FOV = 0.82
 #: Distance of the preset `tool` from the blades (m).
 _TOOL_DISTANCE = 0.5
 #: The preset `tool` looks at a place so far ahead of the blades (m): there is what they will cut.
@@ -159,7 +161,7 @@ class SceneCameras:
         self._rods: Callable[[], Sequence[Capsule]] = tuple
         self._now = -math.inf
         self._initial_camera = server.initial_camera
-        self._initial_camera.fov = 0.82
+        self._initial_camera.fov = FOV
         self._initial_base = np.full(3, np.inf)
         self._update_initial_camera(np.zeros(3))
 

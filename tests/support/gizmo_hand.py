@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rolling_panda.errors import InputError
+from server.scene.cameras import FOV, preset_pose
 from server.scene.gizmo import GIZMO_PX
 
 if TYPE_CHECKING:
@@ -20,30 +21,30 @@ _TURN_MS = 50
 
 
 class FirstView:
-    """The 3-D view of a page while it has its first camera (`server/scene/scene.py`)."""
-
-    EYE, LOOK_AT, FOV = np.array([-1.45, -1.95, 1.85]), np.array([0.3, 0.45, 0.8]), 0.82
+    """The 3-D view of a page while it has its first camera, with the base where it starts."""
 
     def __init__(self, page: "Page") -> None:
         """Of a page whose view is there."""
         box = page.locator("rp-scene iframe").bounding_box()
         assert box is not None
         self.centre = np.array([box["x"] + box["width"] / 2, box["y"] + box["height"] / 2])
-        self.focal = box["height"] / 2 / math.tan(self.FOV / 2)
-        self.forward = (self.LOOK_AT - self.EYE) / np.linalg.norm(self.LOOK_AT - self.EYE)
+        self.focal = box["height"] / 2 / math.tan(FOV / 2)
+        camera = preset_pose("follow", np.zeros(12), np.zeros(3))
+        self.eye = camera.position
+        self.forward = (camera.look_at - self.eye) / np.linalg.norm(camera.look_at - self.eye)
         self.right = np.cross(self.forward, [0.0, 0.0, 1.0])
         self.right /= np.linalg.norm(self.right)
         self.down = np.cross(self.forward, self.right)
 
     def pixel(self, point: Array) -> Array:
         """Where a point in odom (m) is on the page (px)."""
-        offset = point - self.EYE
+        offset = point - self.eye
         across = np.array([offset @ self.right, offset @ self.down])
         return np.asarray(self.centre + self.focal * across / (offset @ self.forward))
 
     def metres(self, pixels: float, point: Array) -> float:
         """What this many pixels are at the depth of a point (m)."""
-        return float(pixels * ((point - self.EYE) @ self.forward) / self.focal)
+        return float(pixels * ((point - self.eye) @ self.forward) / self.focal)
 
 
 class GizmoHand:
