@@ -62,6 +62,15 @@ def test_without_a_cut_it_says_so_everywhere(page: Page, server: PlayedServer) -
     assert server.cut_pictures_fetched == []
 
 
+def test_nothing_of_the_view_behind_shows_through(page: Page, server: PlayedServer) -> None:
+    server.points = tuple(msgspec.structs.replace(each, cane_angle=0.1) for each in server.points)
+    server.tell(server.page_points())
+    blades = page.locator("rp-camera .mark path.ring").first
+    expect(blades).to_be_visible()
+    open_screen(page, "report")
+    expect(blades).to_be_hidden()
+
+
 def test_a_cut_has_its_pictures_and_says_where_one_is_missing(page: Page, server: PlayedServer) -> None:
     server.report = report(cut(1), cut(2, "UNKNOWN"), cut(3, "", ended_at=0.0), cut(4, "FAILED_NOT_CUT", cut_id=""))
     server.cut_pictures = {("c1", "before"): cut_picture(False), ("c1", "after"): cut_picture(True)}

@@ -84,7 +84,7 @@ class CameraMarks {
     mark.setAttribute("transform", `translate(${x.toFixed(1)} ${y.toFixed(1)})`);
     const [, , halo, blades, , sign, title] = mark.children;
     for (const each of [halo, blades]) {
-      each?.setAttribute("visibility", angle === null ? "hidden" : "visible");
+      each?.setAttribute("visibility", angle === null ? "hidden" : "inherit");
       each?.setAttribute("transform", `rotate(${((angle ?? 0) * (180 / Math.PI)).toFixed(0)}) scale(${unit})`);
     }
     sign?.setAttribute("d", SIGNS[entry.state]);

@@ -133,7 +133,7 @@ export class RpCutPicture extends HTMLElement {
     const { cut, along } = this;
     const canes = cut ? [] : (this.picture?.drawing.canes ?? []);
     setAttribute(this.canes, "d", canes.map(linePath).join(""));
-    setAttribute(this.handle, "visibility", cut && this.movable ? "visible" : "hidden");
+    setAttribute(this.handle, "visibility", cut && this.movable ? "inherit" : "hidden");
     const distance = `${along > 0 ? "+" : "−"}${Math.abs(Math.round(1000 * along))}`;
     setText(this.moved, text("picture.moved", { distance }));
     this.moved.hidden = along === 0;
