@@ -43,6 +43,8 @@ SIDEWAYS = """() => [...document.querySelectorAll("main, main *")].filter(each =
   ["auto", "scroll"].includes(getComputedStyle(each).overflowX) && !each.querySelector("table") &&
   each.localName !== "rp-point-strip" &&
   each.scrollWidth > each.clientWidth + 1).map(each => each.localName + "." + each.className)"""
+#: Whether the next step takes a press: one that has just come does not at once.
+SETTLED = "() => document.querySelector('rp-bar .next').getAnimations({ subtree: true }).length === 0"
 TO_THE_END = "() => { for (const each of [document.documentElement, document.body]) each.scrollTo(0, 1e6); }"
 TO_THE_TOP = "() => { for (const each of [document.documentElement, document.body]) each.scrollTo(0, 0); }"
 
@@ -68,6 +70,7 @@ def view_share(page: Page, width: int, height: int) -> float:
 def fits(page: Page, width: int, height: int, over: str = "") -> None:
     """Nothing is cut off, covered or beyond an edge; what lies in `over` may have a banner over it."""
     stop_is_in_sight(page, width, height)
+    page.wait_for_function(SETTLED)
     assert page.locator("rp-bar .next button").evaluate(SEEN)[1] >= 44, "the next step is in sight"
     across, down = page.evaluate("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]")
     assert across <= width and down <= height, "the page itself scrolls"
@@ -90,8 +93,6 @@ def test_the_view_has_most_of_the_window_and_no_banner_takes_any_of_it(
     page: Page, server: PlayedServer, subtests: pytest.Subtests
 ) -> None:
     def at_every_size(state: str, over: str = "") -> None:
-        # A step that has just come takes no press yet.
-        page.wait_for_timeout(450)
         for width, height in SIZES:
             page.set_viewport_size({"width": width, "height": height})
             with subtests.test(state=state, size=f"{width}x{height}"):
