@@ -3,15 +3,18 @@ import time
 from contextlib import contextmanager
 
 import msgspec
+import numpy as np
 import psutil
 import pytest
 import zstandard
+from playwright.sync_api import sync_playwright
 from viser import _messages
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from rolling_panda import topics
 from tests.server.test_client_messages import CAMERA, CLICK, DRAG, FORGED, GRAB, LET_GO, POINTER
+from tests.support.chromium import FLAGS
 from tests.support.fake_wire import FakeWire, joints, odometry, pruning_point, pruning_points, telling
 from tests.support.running_server import PATIENCE_S, eventually, running_server
 
@@ -360,3 +363,40 @@ def test_the_client_waits_for_the_pages_own_file_and_does_without_it_where_it_do
     page.wait_for_function("window.beganWith !== undefined", timeout=1000 * PATIENCE_S)
     assert page.evaluate("beganWith").startswith("?fixedDpr=") == comes
     context.close()
+
+
+@pytest.mark.long
+@pytest.mark.browser
+def test_the_wheel_zooms_towards_the_pointer(server, chromium_path):
+    cameras = []
+
+    def sent(frame):
+        message = msgspec.msgpack.decode(frame)
+        if message["type"] == "ViewerCameraMessage":
+            cameras.append(message)
+
+    with server.client() as client, sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=chromium_path, args=list(FLAGS))
+        context = chromium.new_context(base_url=server.address, locale="en-US", viewport={"width": 600, "height": 400})
+        context.add_cookies([{"name": n, "value": v, "url": server.address} for n, v in client.cookies.items()])
+        page = context.new_page()
+        page.on("websocket", lambda socket: socket.on("framesent", sent))
+        page.goto("/viser/")
+        page.wait_for_function("document.documentElement.dataset.view === 'drawn'", timeout=1000 * PATIENCE_S)
+        page.wait_for_timeout(1000)
+        before = cameras[-1]
+        page.mouse.move(540, 200)
+        for _ in range(4):
+            page.mouse.wheel(0, -200)
+            page.wait_for_timeout(200)
+        page.wait_for_timeout(1000)
+        after = cameras[-1]
+        chromium.close()
+    way = np.subtract(after["position"], before["position"])
+    ahead = np.subtract(before["look_at"], before["position"])
+    right = np.cross(ahead, before["up_direction"])
+    assert way @ ahead > 0.0, "nearer"
+    angle = np.degrees(np.arctan2(way @ right / np.linalg.norm(right), way @ ahead / np.linalg.norm(ahead)))
+    # Four fifths of the way from the middle to the right edge.
+    edge = np.tan(before["fov"] / 2) * 600 / 400
+    assert angle == pytest.approx(np.degrees(np.arctan(0.8 * edge)), abs=4.0)

@@ -61,7 +61,8 @@ def taken_away(assumption: Assumption, server: viser.ViserServer, monkeypatch: p
     elif assumption.name.startswith("viser._messages."):
         monkeypatch.setattr(contract.messages, assumption.name.split(".")[2].partition("(")[0], Changed)
     elif "index.html" in assumption.name:
-        monkeypatch.setattr(contract, "client_page", lambda: b"<head>await begin();")
+        page = contract.client_page().replace(assumption.name.split("'")[1].encode(), b"another();")
+        monkeypatch.setattr(contract, "client_page", lambda: page)
     else:
         # A getter that gives away a copy.
         copied = property(lambda handle: handle._impl.position.copy())

@@ -23,6 +23,8 @@ TESTED_VERSION = "1.1.1"
 VERSION = str(viser.__version__)
 #: The start of viser's client in its page.
 CLIENT_START = b"await init();"
+#: Where that page has unpacked the client's script.
+CLIENT_SCRIPT = b"const code=td.decode(heap.subarray(up+ss,up+sz));"
 
 
 class ViserChangedError(RollingPandaError):
@@ -100,6 +102,10 @@ def _starts_once(_: viser.ViserServer) -> bool:
     return page.count(CLIENT_START) == 1 and page.count(b"<head>") == 1
 
 
+def _unpacks_once(_: viser.ViserServer) -> bool:
+    return client_page().count(CLIENT_SCRIPT) == 1
+
+
 def _keeps_pose(server: viser.ViserServer) -> bool:
     handle = server.scene.add_frame("/contract", show_axes=False)
     try:
@@ -131,6 +137,11 @@ ASSUMPTIONS: tuple[Assumption, ...] = (
         f"one {CLIENT_START.decode()!r} in client/build/index.html",
         "the 3-D client starts before its rendering is configured",
         _starts_once,
+    ),
+    Assumption(
+        f"one {CLIENT_SCRIPT.decode()!r} in client/build/index.html",
+        "the wheel zooms into the middle of the view instead of towards the pointer",
+        _unpacks_once,
     ),
     Assumption(
         "handle.position[:] and handle.wxyz[:] change what viser believes to be drawn",

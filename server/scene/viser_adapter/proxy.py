@@ -17,7 +17,7 @@ from rolling_panda.messages.types import Reason
 from server.auth.sessions import Session
 from server.connections.websocket_protocol import why_ended
 from server.scene.viser_adapter.client_messages import GizmoDragEnd, GizmoUpdate, admit, message_type
-from server.scene.viser_adapter.contract import CLIENT_START, VERSION, client_page
+from server.scene.viser_adapter.contract import CLIENT_SCRIPT, CLIENT_START, VERSION, client_page
 from server.scene.viser_adapter.view_server import ViewServer
 
 #: Viser's own panel and notifications are empty here and would cover the view.
@@ -26,6 +26,10 @@ _STYLE = b"<style>[data-floating-window],.mantine-Notifications-root{display:non
 _SCRIPT = b'<script type="module" src="/js/scene/frame.js"></script>'
 #: The client starts as soon as it is unpacked; patched, it waits for that script, or for the failure to load it.
 _PATCHED_START = b'await Promise.all([init(),import("/js/scene/frame.js").catch(()=>{})]);'
+
+#: The camera's wheel and pinch zoom into the middle of the view, mostly into the arm; patched, towards the pointer. The
+#: option is one of `camera-controls`, which the client does not set.
+_PATCHED_SCRIPT = CLIENT_SCRIPT.replace(b";", b'.replace("dollySpeed:.3,","dollySpeed:.3,dollyToCursor:true,");')
 
 
 def viser_router(
@@ -113,7 +117,8 @@ def _pixel_ratio(websocket: WebSocket) -> float:
 
 def _patched_client_page() -> bytes:
     """The client's page with our script and style."""
-    return client_page().replace(CLIENT_START, _PATCHED_START).replace(b"<head>", b"<head>" + _SCRIPT + _STYLE, 1)
+    page = client_page().replace(CLIENT_START, _PATCHED_START).replace(CLIENT_SCRIPT, _PATCHED_SCRIPT)
+    return page.replace(b"<head>", b"<head>" + _SCRIPT + _STYLE, 1)
 
 
 async def _relay(
