@@ -385,6 +385,7 @@ class BridgeCore:
             round_trip_worst_s=self._round_trip.worst,
             rejections=self.refusals.counts(),
             battery=self._measured.battery,
+            arm_success=self._measured.arm_success,
             relaxed_limits=self._relaxed_limits,
             holder=self._fence.holder if self._fence_kept else "",
             sequence=max(0, self._validator.sequence),

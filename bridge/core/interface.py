@@ -19,7 +19,8 @@ class Measurement:
 
     `detail` explains `outcome`; it is `NO_CUT` before the first cut. `fault` is the reason why the robot cannot move,
     None without one. A person has to release a `severe` fault.
-    `emergency` tells whether the emergency stop button is pressed. `battery` is the charge (0…1), None if unknown.
+    `emergency` tells whether the emergency stop button is pressed. `battery` is the charge (0…1), and `arm_success` the
+    fraction of the arm's last 100 commands that arrived in time; None if unknown.
     """
 
     position: Array
@@ -32,6 +33,7 @@ class Measurement:
     severe: bool = False
     emergency: bool = False
     battery: float | None = None
+    arm_success: float | None = None
 
 
 @dataclass(frozen=True)

@@ -104,7 +104,8 @@ class RealRobot:
             fault=reduce(reasons.both, faults) if faults else None,
             severe=base.severe or arm.severe,
             emergency=base.emergency,
-            battery=base.battery if 0.0 <= base.battery <= 1.0 else None,
+            battery=_fraction(base.battery),
+            arm_success=_fraction(arm.success_rate) if arm.commands > 0 else None,
         )
 
     def write(self, setpoint: Setpoint) -> None:
@@ -134,3 +135,8 @@ class RealRobot:
         self._arm.close()
         if self._camera is not None:
             self._camera.close()
+
+
+def _fraction(value: float) -> float | None:
+    """A fraction that a device tells; None where it is not one, as before the first."""
+    return value if 0.0 <= value <= 1.0 else None

@@ -175,6 +175,7 @@ class BridgeState(Message, frozen=True, kw_only=True):
         round_trip_worst_s: The longest of them (s).
         rejections: Messages refused since the start, by reason.
         battery: Charge of the base, 0 … 1; None if unknown, as in simulation.
+        arm_success: Fraction of the arm's last 100 commands that arrived in time; None if unknown, as in simulation.
         relaxed_limits: Safety limits that its configuration sets less strictly than usual, within their hard bounds.
     """
 
@@ -192,6 +193,7 @@ class BridgeState(Message, frozen=True, kw_only=True):
     round_trip_worst_s: NonNegative = 0.0
     rejections: tuple[RejectionCount, ...] = ()
     battery: Fraction | None = None
+    arm_success: Fraction | None = None
     relaxed_limits: tuple[Reason, ...] = ()
     holder: Annotated[str, Meta(max_length=16)] = ""
     sequence: Count = 0

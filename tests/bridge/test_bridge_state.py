@@ -84,9 +84,10 @@ def test_who_released_the_last_stops_is_told_after_a_restart() -> None:
 
 def test_what_is_measured_is_in_the_state_and_the_joint_states(bench: Bench) -> None:
     bench.drive_on()
-    bench.robot.now = replace(bench.robot.now, battery=0.5)
+    bench.robot.now = replace(bench.robot.now, battery=0.5, arm_success=0.97)
     bench.run(0.05, FORWARD)
-    assert (bench.state.battery, bench.state.cutter, bench.state.kind) == (0.5, "open", "sim")
+    assert (bench.state.battery, bench.state.arm_success) == (0.5, 0.97)
+    assert (bench.state.cutter, bench.state.kind) == ("open", "sim")
     assert bench.state.moving and bench.state.sequence == bench.sequence - 1
     joints = next(out.joints for out in reversed(bench.outputs) if out.joints is not None)
     assert joints.position == pytest.approx(bench.robot.now.position, abs=0.01)

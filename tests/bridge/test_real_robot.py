@@ -53,9 +53,10 @@ def goes_on(rig: Rig) -> bool:
     return rig.until(lambda: float(np.abs(rig.plant.velocity()).max()) > 0.5, FORWARD)
 
 
-def test_the_charge_of_the_base_is_told(rig: Rig) -> None:
+def test_the_charge_of_the_base_and_the_arms_commands_in_time_are_told(rig: Rig) -> None:
     rig.run(0.3, REST)
     assert rig.state.battery == pytest.approx(0.8)
+    assert rig.until(lambda: (rig.state.arm_success or 0.0) > 0.9, REST), "of the last 100"
 
 
 def test_a_bridge_that_hangs_leaves_a_robot_that_comes_to_rest_by_itself(rig: Rig) -> None:

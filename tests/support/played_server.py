@@ -118,6 +118,8 @@ class PlayedServer:
 
     controller: m.ControllerState | None = field(default_factory=controller)
     bridge: m.BridgeState | None = field(default_factory=bridge)
+    #: Of the base; None lets it drive along the row.
+    pose: m.PlanarPose | None = None
     points: tuple[page_messages.PagePoint, ...] = ()
     undecided_sites: tuple[m.UndecidedSite, ...] = ()
     gone: dict[str, float] = field(default_factory=dict)
@@ -259,7 +261,7 @@ class PlayedServer:
             joints=m.JointState(
                 header=m.Header(stamp=0.1 * self.number), sequence=self.number, position=(0.0,) * 9, velocity=(0.0,) * 9
             ),
-            base=m.PlanarPose(x=0.021 * self.number),
+            base=self.pose or m.PlanarPose(x=0.021 * self.number),
             camera_frame=1 + self.number // 5,
             client="me",
             control=self.control,

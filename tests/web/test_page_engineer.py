@@ -1,11 +1,14 @@
 """The screen for engineers: panels that are arranged, versions, the wire, charts."""
 
+import math
+
 import msgspec
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Locator, Page, expect
 
+from rolling_panda import messages as m
 from tests.support.page_parts import open_screen
-from tests.support.played_server import PlayedServer, diagnostics
+from tests.support.played_server import PlayedServer, bridge, diagnostics
 
 pytestmark = pytest.mark.browser
 USUAL = ["alarms", "processes", "telemetry", "charts", "log", "topics", "models"]
@@ -68,6 +71,47 @@ def test_a_panel_that_was_moved_goes_on(page: Page, server: PlayedServer) -> Non
     expect(page.locator("#log-words")).to_have_value("signed")
     expect(page.locator("#log li")).to_have_count(1)
     expect(page.locator("rp-gauge [class*=value]").first).to_have_text("2.1")
+
+
+def test_the_way_of_the_base_is_counted_from_a_press_on_whatever_screen_is_open(
+    page: Page, server: PlayedServer
+) -> None:
+    def way(name: str) -> Locator:
+        return page.locator(f'[data-way="{name}"] dd')
+
+    def go(x: float, y: float, phi: float) -> None:
+        server.pose = m.PlanarPose(x=x, y=y, phi=math.remainder(phi, 2 * math.pi))
+        server.tell(server.state())
+
+    open_screen(page, "engineer")
+    go(1.0, 2.0, 0.0)
+    expect(way("x")).to_have_text("1.000 m")
+    expect(way("y")).to_have_text("2.000 m")
+    page.locator("#way-from-here").click()
+    expect(way("distance")).to_have_text("0.000 m")
+    open_screen(page, "drive")
+    go(1.5, 2.0, 0.0)
+    for step in range(1, 11):
+        go(1.5, 2.0, step * 0.225 * 2 * math.pi)
+    # Two turns and a quarter to the left: back is to the right of the row.
+    go(1.5, 1.8, math.pi / 2)
+    open_screen(page, "engineer")
+    expect(way("heading")).to_have_text("90.0°")
+    expect(way("distance")).to_have_text("0.300 m")
+    expect(way("turns")).to_have_text("2.250")
+    # A bridge that begins again begins its odometry again: that is no motion.
+    server.number, server.pose = 0, m.PlanarPose(x=0.0)
+    expect(way("x")).to_have_text("0.000 m")
+    expect(way("distance")).to_have_text("0.300 m")
+
+
+def test_the_arms_commands_in_time_are_told_of_a_real_robot_alone(page: Page, server: PlayedServer) -> None:
+    open_screen(page, "engineer")
+    gauge = page.locator('[data-gauge="arm-success"]')
+    expect(gauge).to_be_hidden()
+    server.bridge = bridge(kind="real", arm_success=0.93)
+    expect(gauge.locator(".value")).to_have_text("93")
+    expect(gauge.locator(".gauge-warning")).to_have_text("▾ low")
 
 
 def test_processes_have_versions_and_a_different_one_is_told(page: Page, server: PlayedServer) -> None:

@@ -77,6 +77,8 @@ FAMILIES: dict[str, Sequence[str]] = {
     "telemetry.${}": ("low", "high", ""),
     "reading.${}": READINGS,
     "reading.${}.hint": READINGS,
+    "way.${}": ("x", "y", "heading", "distance", "turns"),
+    "way.${}.hint": ("x", "y", "heading", "distance", "turns"),
     "label.${}": ("train", "held-out"),
     "label.${}.hint": ("train", "held-out"),
     "label.class.${}": tuple(name for name in VALUES if name != "unlabelled"),

@@ -1,9 +1,11 @@
-// Telemetry gauges: tracking error, margins to limits, timing.
+// Telemetry gauges: tracking error, margins to limits, timing; and the way of the base.
 
+import { decimal, degrees } from "../js/state/format.js";
 import { isLive, link, now, pageState, staleWords } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
 import { text } from "../js/state/texts.js";
 import { element, setText, svg } from "../js/views/dom.js";
+import { Odometer } from "../js/views/odometer.js";
 import { READINGS, beyondLimit } from "../js/views/readings.js";
 
 /** @typedef {import("../js/views/readings.js").Reading} Reading */
@@ -76,6 +78,8 @@ class RpGauge extends HTMLElement {
 }
 customElements.define("rp-gauge", RpGauge);
 
+/** Only a real robot's devices tell these. */
+const OF_DEVICES = new Set(["battery", "arm-success"]);
 /** The others have only charts. */
 const SHOWN = READINGS.filter((reading) => reading.place !== "chart");
 
@@ -98,9 +102,9 @@ class RpTelemetry extends HTMLElement {
       if (state === null) return;
       values = SHOWN.map((reading) => reading.read(state));
       values.forEach((value, index) => gauges[index]?.show(value));
-      // A simulated base has no battery.
-      const battery = gauges[SHOWN.findIndex((reading) => reading.id === "battery")];
-      if (battery) battery.hidden = state.bridge?.kind === "sim";
+      gauges.forEach((gauge) => {
+        gauge.hidden = OF_DEVICES.has(gauge.dataset.gauge ?? "") && state.bridge?.kind === "sim";
+      });
     });
     drawOn([now, link], () => {
       const words = staleWords("bridge", "controller");
@@ -110,7 +114,43 @@ class RpTelemetry extends HTMLElement {
       gauges.forEach((gauge, index) => gauge.addSample(live ? (values[index] ?? null) : null));
     });
     gauges.forEach((gauge) => gauge.show(null));
+    this.append(wayOfBase());
   }
+}
+
+/** Where the base is, and what it has driven and turned since the press; counted also while another screen is open. */
+function wayOfBase() {
+  const odometer = new Odometer();
+  const list = element("dl");
+  const figures = ["x", "y", "heading", "distance", "turns"].map((name) => {
+    const figure = element("dd", { class: "number" });
+    const title = text(`way.${name}.hint`);
+    list.append(element("div", { data: { way: name }, attributes: { title } }, element("dt", { text: text(`way.${name}`) }), figure));
+    return figure;
+  });
+  const draw = () => {
+    const base = pageState.get()?.base ?? null;
+    const { distance, turned } = odometer;
+    const words = base && [
+      `${decimal(base.x, 3)} m`,
+      `${decimal(base.y, 3)} m`,
+      `${degrees(base.phi)}°`,
+      `${decimal(distance, 3)} m`,
+      decimal(turned / (2 * Math.PI), 3),
+    ];
+    figures.forEach((figure, index) => setText(figure, words?.[index] ?? "–"));
+  };
+  const count = () => {
+    odometer.reset();
+    draw();
+  };
+  // Every state counts, not only those that are drawn.
+  pageState.subscribe((state) => {
+    if (state?.base && state.joints) odometer.update(state.base, state.joints.header.stamp);
+  });
+  drawOn([pageState], draw);
+  const from = element("button", { id: "way-from-here", text: text("way.from_here"), attributes: { title: text("way.from_here.hint") }, onclick: count });
+  return element("section", { class: "way", attributes: { "aria-label": text("way.label") } }, list, from);
 }
 
 customElements.define("rp-telemetry", RpTelemetry);

@@ -293,6 +293,8 @@ export interface BridgeState {
   rejections: RejectionCount[];
   /** Charge of the base, 0 … 1; None if unknown, as in simulation. */
   battery: number|null;
+  /** Fraction of the arm's last 100 commands that arrived in time; None if unknown, as in simulation. */
+  arm_success: number|null;
   /** Safety limits that its configuration sets less strictly than usual, within their hard bounds. */
   relaxed_limits: Reason[];
   /** First 16 hexadecimal digits of the SHA-256 of the token's random part; empty without a holder. */

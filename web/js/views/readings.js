@@ -99,6 +99,14 @@ export const READINGS = Object.freeze([
     read: (/** @type {PageState} */ state) => scaled(state.bridge?.battery ?? undefined, 100),
   },
   {
+    id: "arm-success",
+    unit: "%",
+    fullScale: 100,
+    warnBelow: 95,
+    format: (/** @type {number} */ value) => value.toFixed(0),
+    read: (/** @type {PageState} */ state) => scaled(state.bridge?.arm_success ?? undefined, 100),
+  },
+  {
     id: "real-time-factor",
     unit: "×",
     fullScale: 1.2,
