@@ -1,5 +1,6 @@
 // Help: the keys, the operator's short guide, and the hints once more.
 
+import { openScreen } from "../state/screens.js";
 import { LANGUAGE, text } from "../state/texts.js";
 import { element } from "./dom.js";
 import { showHints } from "./hints.js";
@@ -51,6 +52,7 @@ function built() {
   );
   again.addEventListener("click", () => {
     made.close();
+    openScreen("work");
     showHints();
   });
   return made;
