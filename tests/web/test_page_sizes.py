@@ -5,6 +5,7 @@ from playwright.sync_api import Page, expect
 
 from tests.support.page_parts import open_screen, show_mode, working
 from tests.support.page_states import STATES
+from tests.support.played_page import box_of
 from tests.support.played_server import PlayedServer, controller, point
 
 pytestmark = pytest.mark.browser
@@ -115,6 +116,20 @@ def test_the_view_has_most_of_the_window_and_no_banner_takes_any_of_it(
     server.sockets[-1].close()
     expect(page.locator("rp-link-banner")).to_contain_text("No link to the server")
     at_every_size("no link", ".stage")
+
+
+@pytest.mark.parametrize("name", ["work", "review", "drive", "report", "engineer"])
+def test_the_words_of_a_banner_have_room_on_every_screen(
+    page: Page, server: PlayedServer, name: str, subtests: pytest.Subtests
+) -> None:
+    working(page, server)
+    open_screen(page, name)
+    show_mode(page, server, controller("PAUSED", reason="nobody has looked at the robot for 2.0 s"))
+    words = page.locator("rp-alarms li:visible .alarm-words").first
+    for width, height in SIZES:
+        page.set_viewport_size({"width": width, "height": height})
+        with subtests.test(size=f"{width}x{height}"):
+            assert box_of(words)["width"] >= 150
 
 
 @pytest.mark.parametrize("name", ["review", "drive", "report", "engineer"])
