@@ -903,6 +903,11 @@ def press_resume() -> None:
 
 
 @_reason("info", "")
+def resume_work() -> None:
+    """When that is seen to, press Resume: the work goes on."""
+
+
+@_reason("info", "")
 def hold_again() -> None:
     """Hold again to go on."""
 

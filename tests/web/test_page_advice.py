@@ -13,6 +13,7 @@ from rolling_panda.messages import page as page_messages
 from rolling_panda.messages import types as types_messages
 from rolling_panda.messages.supervision import ControlState, PreviewState
 from tests.support.page_parts import held, show
+from tests.support.played_page import until
 from tests.support.played_server import PlayedServer, controller, point
 
 pytestmark = pytest.mark.browser
@@ -49,7 +50,7 @@ class Case:
 
 
 CASES = {
-    "work": Case(mode("PAUSED", "work"), "press_resume press_start", "#resume"),
+    "work": Case(mode("PAUSED", "work"), "resume_work", "#to-continue"),
     "work, nothing accepted": Case(mode("PAUSED", "work"), "press_resume accept_start", "#resume", points=(WAITS,)),
     "work, nothing found": Case(mode("PAUSED", "work"), "press_resume press_survey", "#resume", points=()),
     "survey": Case(mode("PAUSED", "survey"), "press_resume survey_on", "#resume", points=(WAITS,)),
@@ -57,11 +58,9 @@ CASES = {
     "teleoperation": Case(mode("PAUSED", "teleoperation"), "press_resume hold_again", "#resume"),
     "preview wanted": Case(mode("PAUSED", "work"), "press_resume preview_start", "#resume", preview=needed("none")),
     "preview shown": Case(mode("PAUSED", "work"), "press_resume approve_start", "#resume", preview=needed("ready")),
-    "preview approved": Case(mode("PAUSED", "work"), "press_resume press_start", "#resume", preview=needed("approved")),
-    "somebody else's": Case(
-        mode("PAUSED", "work"), "control_held press_resume press_start", "#request-control", control=THEIRS
-    ),
-    "nobody's": Case(mode("PAUSED", "work"), "press_resume press_start", "#resume", control=None),
+    "preview approved": Case(mode("PAUSED", "work"), "resume_work", "#to-continue", preview=needed("approved")),
+    "somebody else's": Case(mode("PAUSED", "work"), "control_held resume_work", "#request-control", control=THEIRS),
+    "nobody's": Case(mode("PAUSED", "work"), "resume_work", "#to-continue", control=None),
     "looking on": Case(mode("PAUSED", "survey"), "ask_operator", role="viewer"),
     "resumed": Case(mode("READY", "work"), "press_start", "#start"),
     "resumed, preview shown": Case(mode("READY", "work"), "approve_start", preview=needed("ready")),
@@ -112,3 +111,45 @@ def test_once_resume_is_pressed_nothing_advises_to_press_it(page: Page, server: 
     server.controller = mode("AUTO", phase="SURVEY")
     expect(page.locator("#alarms")).to_be_hidden()
     expect(page.locator("#alarms li")).to_have_count(0)
+
+
+def asked(server: PlayedServer) -> list[str]:
+    return [path for path, _ in server.posted if path in ("/api/resume", "/api/start")]
+
+
+def test_one_press_leads_from_a_pause_back_to_work(page: Page, server: PlayedServer) -> None:
+    server.controller = mode("PAUSED", "work")
+    show(server, TAKEN)
+    page.locator("#to-continue").click()
+    until(page, lambda: asked(server) == ["/api/resume", "/api/start"])
+
+
+def test_work_is_not_started_where_resuming_is_refused(page: Page, server: PlayedServer) -> None:
+    server.controller = mode("PAUSED", "work")
+    show(server, TAKEN)
+    server.answers["/api/resume"] = (409, {"ok": False, "reason": "not now"})
+    page.locator("#to-continue").click()
+    expect(page.locator(".toast")).to_contain_text("Resume refused: not now")
+    page.wait_for_timeout(300)
+    assert asked(server) == ["/api/resume"]
+
+
+@pytest.mark.parametrize(
+    ("interrupted", "points", "preview"),
+    [
+        ("teleoperation", (TAKEN,), None),
+        ("survey", (TAKEN,), None),
+        ("work", (WAITS,), None),
+        ("work", (TAKEN, point(2, "UNKNOWN", spur=2)), None),
+        ("work", (TAKEN,), needed("ready")),
+    ],
+)
+def test_resume_starts_no_work_where_something_else_was_interrupted_or_comes_first(
+    page: Page, server: PlayedServer, interrupted: str, points: Any, preview: PreviewState | None
+) -> None:
+    server.controller = mode("PAUSED", interrupted)
+    show(server, *points)
+    server.tell(page_messages.PagePreview(preview=preview or NO_PREVIEW))
+    page.locator(".next #resume").click()
+    page.wait_for_timeout(300)
+    assert asked(server) == ["/api/resume"]

@@ -19,6 +19,7 @@ const PRESSES = Object.freeze({
   acknowledge_resume: "Acknowledge",
   acknowledge_arm: "Acknowledge",
   press_resume: "Resume",
+  resume_work: "continue",
   resume_home: "Resume",
   press_start: "Start",
   press_survey: "Survey",
@@ -134,6 +135,7 @@ function newRow(reason) {
 /** @param {Step} step */
 function labelOf(step) {
   if (step === "Acknowledge") return text("bar.checked");
+  if (step === "continue") return text("command.Resume");
   return COMMANDS.some((each) => each === step) ? text(`command.${step}`) : text(`bar.to_${step}`);
 }
 customElements.define("rp-alarms", RpAlarms);

@@ -19,9 +19,9 @@ import { menu } from "../js/views/menu.js";
 /** @typedef {{ box: HTMLElement, button: HTMLButtonElement, label: HTMLElement }} StepButton */
 
 /** @type {readonly Step[]} */
-const STEPS = Object.freeze([...COMMANDS, "review", "preview", "approve", "reset"]);
+const STEPS = Object.freeze([...COMMANDS, "continue", "review", "preview", "approve", "reset"]);
 /** The icon of each step; of another one, its own name. @type {Readonly<Partial<Record<Step, string>>>} */
-const ICONS = Object.freeze({ Arm: "READY", Start: "AUTO", Resume: "AUTO", Pause: "PAUSED", Acknowledge: "present", approve: "present", preview: "AUTO", reset: "present" });
+const ICONS = Object.freeze({ Arm: "READY", Start: "AUTO", Resume: "AUTO", continue: "AUTO", Pause: "PAUSED", Acknowledge: "present", approve: "present", preview: "AUTO", reset: "present" });
 /** Lengths of a survey (m). */
 const DISTANCES = Object.freeze([1, 2, 4, 8, 15, 30, 60, 120]);
 
@@ -116,13 +116,10 @@ async function fetchPreview() {
 /** Label of a step on the large button. @param {Step} step */
 function labelOf(step) {
   switch (step) {
-    case "Start": {
-      const count = countOf("ACCEPTED");
-      if (count === 0) return text("command.Start");
-      const seconds = timeLeft();
-      const time = seconds ? ` · ~${durationWords(seconds)}` : "";
-      return counted("bar.start", count) + time;
-    }
+    case "Start":
+      return countOf("ACCEPTED") > 0 ? counted("bar.start", countOf("ACCEPTED")) + howLong() : text("command.Start");
+    case "continue":
+      return counted("bar.resume", countOf("ACCEPTED")) + howLong();
     case "review":
       return counted("bar.review", countOf("PROPOSED"));
     case "Acknowledge":
@@ -134,6 +131,11 @@ function labelOf(step) {
     default:
       return text(`command.${step}`);
   }
+}
+
+function howLong() {
+  const seconds = timeLeft();
+  return seconds ? ` · ~${durationWords(seconds)}` : "";
 }
 
 function distanceChoice() {

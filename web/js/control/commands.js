@@ -8,7 +8,7 @@ import { whyNot } from "./allowed.js";
 import { approvePreview, openPreview, whyNoApproval } from "./preview.js";
 
 /** @typedef {"Arm"|"Survey"|"Start"|"Pause"|"Resume"|"Home"|"Acknowledge"} CommandName */
-/** @typedef {CommandName|"review"|"preview"|"approve"|"reset"} Step */
+/** @typedef {CommandName|"continue"|"review"|"preview"|"approve"|"reset"} Step */
 
 /** @type {readonly CommandName[]} */
 export const COMMANDS = Object.freeze(["Arm", "Survey", "Start", "Pause", "Resume", "Home", "Acknowledge"]);
@@ -23,12 +23,16 @@ export function isCommand(step) {
 /** Why a step is not possible now. @param {Step} step */
 export function whyNotStep(step) {
   if (step === "approve") return whyNoApproval();
+  if (step === "continue") return whyNot("Resume");
   return isCommand(step) ? whyNot(step) : null;
 }
 
 /** @param {Step} step */
 export function take(step) {
   switch (step) {
+    case "continue":
+      void continueWork();
+      break;
     case "review":
       openScreen("review");
       break;
@@ -44,4 +48,9 @@ export function take(step) {
     default:
       void ask(text(`command.${step}`), `api/${step.toLowerCase()}`, step === "Survey" ? { distance: surveyDistance.get() } : {});
   }
+}
+
+/** Two requests, each checked by the controller: resuming alone starts no work. */
+async function continueWork() {
+  if (await ask(text("command.Resume"), "api/resume")) void ask(text("command.Start"), "api/start");
 }

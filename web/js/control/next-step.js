@@ -18,7 +18,7 @@ export function nextStep() {
     case "TELEOP":
       return "Pause";
     case "PAUSED":
-      return "Resume";
+      return mayContinue(state.controller.interrupted) ? "continue" : "Resume";
     case "PROTECTIVE_STOP":
     case "FAULT":
       return "Acknowledge";
@@ -38,6 +38,15 @@ function whenReady(surveying) {
   if (countOf("ACCEPTED") > 0) return withPreview();
   if (countOf("PROPOSED") === 0) return "Survey";
   return screen.get() === "review" ? "Start" : "review";
+}
+
+/**
+ * Does one press lead from a pause back to work? Not where a person has to look at a plant or a preview first.
+ *
+ * @param {import("../link/messages.js").ControllerState["interrupted"]} interrupted
+ */
+export function mayContinue(interrupted) {
+  return interrupted === "work" && countOf("UNKNOWN") === 0 && countOf("ACCEPTED") > 0 && withPreview() === "Start";
 }
 
 /** @returns {Step} */

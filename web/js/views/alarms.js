@@ -3,6 +3,7 @@
 
 import { countOf } from "../control/allowed.js";
 import { holder } from "../control/lease.js";
+import { mayContinue } from "../control/next-step.js";
 import { hardwareStopPressed } from "../control/stop.js";
 import { isGone, isLive, isOpening, link, pageState, preview } from "../state/page-state.js";
 import { reason, severityOf } from "../state/reasons.js";
@@ -86,7 +87,7 @@ function ofMode({ controller }) {
     case "FAULT":
       return [alarm(reason("mode_fault", { cause }), afterFault(controller))];
     case "PAUSED":
-      return [alarm(reason("mode_paused", { cause }), byOperator(reason("press_resume"), next(controller)))];
+      return [alarm(reason("mode_paused", { cause }), byOperator(...afterPause(controller)))];
     case "READY": {
       // Takes the place of "Paused": Resume alone starts nothing.
       const waits = controller.interrupted === "work" && countOf("ACCEPTED") > 0;
@@ -202,6 +203,11 @@ function afterFault({ allowed }) {
 /** @param {ControllerState["allowed"]} allowed */
 function mended(allowed) {
   return allowed["Acknowledge"] === null ? reason("cause_gone") : reason("mend_cause");
+}
+
+/** @param {ControllerState} controller In PAUSED. */
+function afterPause(controller) {
+  return mayContinue(controller.interrupted) ? [reason("resume_work")] : [reason("press_resume"), next(controller)];
 }
 
 /**
