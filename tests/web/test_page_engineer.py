@@ -84,6 +84,9 @@ def test_the_way_of_the_base_is_counted_from_a_press_on_whatever_screen_is_open(
         server.tell(server.state())
 
     open_screen(page, "engineer")
+    go(-0.0001, 2.0, -0.0001)
+    expect(way("x")).to_have_text("0.000 m")
+    expect(way("heading")).to_have_text("0.0°")
     go(1.0, 2.0, 0.0)
     expect(way("x")).to_have_text("1.000 m")
     expect(way("y")).to_have_text("2.000 m")

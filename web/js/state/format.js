@@ -11,7 +11,7 @@ const FORMATS = new Map();
  */
 function formatted(value, options) {
   const key = JSON.stringify(options);
-  const format = FORMATS.get(key) ?? new Intl.NumberFormat(LANGUAGE, { useGrouping: false, ...options });
+  const format = FORMATS.get(key) ?? new Intl.NumberFormat(LANGUAGE, { useGrouping: false, signDisplay: "negative", ...options });
   FORMATS.set(key, format);
   return format.format(value);
 }
