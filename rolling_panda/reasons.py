@@ -396,7 +396,7 @@ def robot_halted(before: str, after: str, cause: Reason) -> None:
 
 @_reason("info", "")
 def command_by(command: str, user: str) -> None:
-    """{command} by {user}."""
+    """{user} pressed {command}."""
 
 
 @_reason("info", "")

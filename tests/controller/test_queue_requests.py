@@ -14,13 +14,13 @@ def test_each_request_is_one_line_of_the_log():
     before = len(r.events)
     for intent, words in [
         (intents.Start(user="ada"), "start refused"),
-        (intents.Arm(user="ada"), "IDLE → READY: arm by ada"),
+        (intents.Arm(user="ada"), "IDLE → READY: ada pressed arm"),
         (intents.AcceptAll(user="ada"), text_of(reasons.points_accepted("ada", 1, 0.8))),
         (intents.RejectPoint(user="ada", point_id="p1", reason="rotten"), "ada rejected p1: rotten"),
         (intents.AcceptPoint(user="ada", point_id="p1", revision=1), "ada accepted p1, revision 1"),
-        (intents.Start(user="ada"), "READY → AUTO: start by ada"),
-        (intents.Pause(user="ada"), "AUTO → PAUSED: pause by ada"),
-        (intents.Resume(user="ada"), "PAUSED → READY: resume by ada"),
+        (intents.Start(user="ada"), "READY → AUTO: ada pressed start"),
+        (intents.Pause(user="ada"), "AUTO → PAUSED: ada pressed pause"),
+        (intents.Resume(user="ada"), "PAUSED → READY: ada pressed resume"),
         (intents.Home(user="ada"), "ada sends the arm home"),
     ]:
         r.ask(intent)
