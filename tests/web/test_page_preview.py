@@ -9,7 +9,8 @@ from rolling_panda import reasons
 from rolling_panda.messages import page as p
 from rolling_panda.messages.supervision import PreviewedCut, PreviewState
 from rolling_panda.reasons import text_of
-from tests.support.played_page import until
+from tests.support.page_parts import open_screen
+from tests.support.played_page import box_of, until
 from tests.support.played_server import PlayedServer, controller, point
 from tests.support.points import rolled_out
 
@@ -55,13 +56,32 @@ def moments(server: PlayedServer) -> list[float | None]:
     return [message.time for message in server.said if isinstance(message, p.ShowPreview)]
 
 
+@pytest.mark.parametrize(("before", "after"), [("review", "work"), ("engineer", "work"), ("drive", "drive")])
+def test_a_preview_lies_over_the_large_view(page: Page, server: PlayedServer, before: str, after: str) -> None:
+    told(server)
+    open_screen(page, before)
+    page.locator("#show-preview").click()
+    expect(page.locator("rp-preview")).to_be_visible()
+    expect(page.locator("main")).to_have_attribute("data-screen", after)
+
+
+def test_beside_a_picture_its_controls_are_whole(page: Page, server: PlayedServer) -> None:
+    told(server)
+    page.locator("#show-preview").click()
+    open_screen(page, "review")
+    page.set_viewport_size({"width": 1440, "height": 900})
+    panel = box_of(page.locator("rp-preview"))
+    for button in page.locator("rp-preview button:visible").all():
+        assert box_of(button)["x"] + box_of(button)["width"] <= panel["x"] + panel["width"]
+
+
 def test_a_preview_is_asked_for_of_all_or_of_the_chosen_point(page: Page, server: PlayedServer) -> None:
     page.locator("#show-preview").click()
     until(page, lambda: server.posted == [("/api/preview", {"point_id": ""})])
     page.locator("#preview").click()
     until(page, lambda: server.posted[1:] == [("/api/preview", {"point_id": ""})])
     expect(page.locator("#preview-one")).to_have_attribute("title", text_of(reasons.none_chosen()))
-    page.locator('.strip-mark[data-point-id="p2"]').click()
+    page.locator('[data-cut="p2"] button').click()
     page.locator("#preview-one").click()
     until(page, lambda: ("/api/preview", {"point_id": "p2"}) in server.posted)
 

@@ -3,6 +3,7 @@
 import { ask } from "../link/api.js";
 import { socket } from "../link/socket.js";
 import { preview } from "../state/page-state.js";
+import { openScreen, screen } from "../state/screens.js";
 import { text } from "../state/texts.js";
 import { signal } from "../state/signals.js";
 import { whyNot, whyNothing } from "./allowed.js";
@@ -49,8 +50,9 @@ export function approvePreview() {
   return ask(text("preview.approving"), "api/preview/approve", { preview_hash: preview.get()?.preview_hash ?? "" });
 }
 
-/** Lay the preview over the view, and ask for one where there is none. */
+/** Lay the preview over the large view, and ask for one where there is none. */
 export function openPreview() {
+  if (screen.get() !== "drive") openScreen("work");
   previewOpen.set(true);
   if (!hasPreview() && !whyNoPreview()) void askPreview("");
 }
