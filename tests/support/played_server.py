@@ -127,6 +127,7 @@ class PlayedServer:
     #: Path of its page, where there are several.
     base: str = ""
     control: ControlState | None = None
+    viewers: int = 1
     stopped: tuple[StopState, ...] = ()
     replay: ReplayState | None = None
     plain_wire: bool = False
@@ -252,7 +253,7 @@ class PlayedServer:
             number=self.number,
             user="Ada",
             role=self.role,
-            viewers=1,
+            viewers=self.viewers,
             processes=rows,
             controller=self.controller,
             controller_age_s=None if self.controller is None else ages["controller"],

@@ -25,6 +25,19 @@ def test_alone_there_is_nothing_to_see_of_it(page: Page, server: PlayedServer) -
     expect(page.locator("#stop small")).to_have_text(["software stop", "space bar"])
 
 
+def test_where_there_is_no_view_it_is_said_only_if_there_is_something_to_press(
+    page: Page, server: PlayedServer
+) -> None:
+    server.control = held("me", "Ada")
+    server.viewers = 2
+    expect(page.locator("rp-lease")).to_contain_text("You hold control")
+    for name in ("report", "engineer"):
+        open_screen(page, name)
+        expect(page.locator("rp-lease")).to_be_hidden()
+    server.control = held("me", "Ada", requested_by="Bob", requested_key="other")
+    expect(page.locator("#grant-control")).to_be_visible()
+
+
 def test_control_is_taken_from_somebody_only_by_a_second_press(page: Page, server: PlayedServer) -> None:
     open_screen(page, "drive")
     server.control = held("other", "Bob")

@@ -144,6 +144,15 @@ def test_a_screen_that_is_left_and_opened_again_is_as_it_was(page: Page, name: s
     assert page.frames[1].evaluate("() => window.same")
 
 
+def test_on_a_telephone_the_tabs_have_words_too(page: Page) -> None:
+    page.set_viewport_size({"width": 390, "height": 844})
+    for tab in page.locator("rp-screens a").all():
+        words, box = box_of(tab.locator("span").first), box_of(tab)
+        assert words["width"] > 25 and words["height"] > 15, tab.inner_text()
+        assert box["x"] <= words["x"] and words["x"] + words["width"] <= box["x"] + box["width"]
+        assert words["y"] + words["height"] <= 844
+
+
 def test_on_a_telephone_a_screen_has_one_scroller(page: Page, server: PlayedServer) -> None:
     page.set_viewport_size({"width": 390, "height": 844})
     server.points = tuple(point(number, "ACCEPTED", spur=number) for number in range(1, 30))

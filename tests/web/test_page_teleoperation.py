@@ -12,6 +12,7 @@ from rolling_panda import reasons
 from rolling_panda.messages import page as p
 from rolling_panda.messages.supervision import SavedPosture
 from rolling_panda.reasons import text_of
+from tests.support.page_parts import open_screen
 from tests.support.played_page import box_of, until
 from tests.support.played_server import PlayedServer, controller
 
@@ -371,3 +372,22 @@ def test_the_present_posture_is_saved_and_others_deleted_but_not_the_programs_ow
     page.locator("#save-posture").click()
     expect(page.locator("rp-toasts")).to_contain_text("There is a posture “Low” already")
     expect(page.locator("#posture-name")).to_have_value("Low")
+
+
+# --- the view --------------------------------------------------------------------------------------------------------
+
+
+def test_whoever_begins_to_move_the_robot_sees_it_though_the_camera_was_at_a_point(
+    page: Page, server: PlayedServer
+) -> None:
+    def placed() -> list[str]:
+        return [message.preset for message in server.said if isinstance(message, p.PlaceCamera)]
+
+    page.locator("#teleop").click()
+    page.locator("#teleop").click()
+    assert placed() == [], "the camera is where it was placed"
+    open_screen(page, "work")
+    page.locator(".cuts button").first.click()
+    open_screen(page, "drive")
+    page.locator("#teleop").click()
+    until(page, lambda: placed() == ["follow"])

@@ -3,6 +3,7 @@
 import { whyNoTeleoperation } from "../js/control/allowed.js";
 import { arrived, go, goal, whyNoGoing } from "../js/control/posture-goal.js";
 import { PARTS, axes, hold, moving, setTeleoperating, showAxes, showMoving, teleoperating } from "../js/control/teleoperation.js";
+import { showRobot } from "../js/control/view-tools.js";
 import { nearWords } from "../js/state/format.js";
 import { link, now, pageState, roundTrip } from "../js/state/page-state.js";
 import { reasonText } from "../js/state/reasons.js";
@@ -29,7 +30,10 @@ class RpDrive extends HTMLElement {
       icon("TELEOP"),
       text("teleop.toggle"),
     );
-    toggle.addEventListener("click", () => setTeleoperating(!teleoperating.get()));
+    toggle.addEventListener("click", () => {
+      setTeleoperating(!teleoperating.get());
+      if (teleoperating.get()) showRobot();
+    });
     const what = choice("part", moving, showMoving, PARTS);
     const frame = choice("axes", axes, showAxes, ["tool", "base", "world"]);
     const [pace, percent] = speedSlider();

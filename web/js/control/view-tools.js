@@ -1,7 +1,7 @@
 // The 3-D view of this page: camera presets, layers, measuring.
 
 import { socket } from "../link/socket.js";
-import { link } from "../state/page-state.js";
+import { link, selected } from "../state/page-state.js";
 import { signal } from "../state/signals.js";
 import { placing, setPlacing } from "./placing.js";
 import { isTyping } from "./stop.js";
@@ -53,9 +53,21 @@ function sendLayers() {
   socket.send({ type: "ShowLayers", layers: [...layers.get()] });
 }
 
+/** Has the camera flown to a point since it was last placed? */
+let atPoint = false;
+selected.subscribe((point) => {
+  atPoint = point !== "";
+});
+
 /** @param {CameraPreset} preset */
 export function placeCamera(preset) {
+  atPoint = false;
   socket.send({ type: "PlaceCamera", preset });
+}
+
+/** Whoever moves the robot sees it, though the camera was at a point. */
+export function showRobot() {
+  if (atPoint) placeCamera("follow");
 }
 
 /** @param {boolean} on */
