@@ -247,6 +247,7 @@ class Controller:
             intents.Start: self._start,
             intents.Survey: self._survey,
             intents.LookAgain: self._look_again,
+            intents.CalibrateCamera: lambda asked, now: self._begin(asked, now, self._movement.look_at_board),
             intents.Pause: self._pause,
             intents.Home: self._home,
             intents.Reset: lambda asked, now: self._supervisor.stops.ask_release(asked, self._supervisor.bridge, now),

@@ -1,6 +1,7 @@
 """Start perception: `python -m perception` or `rolling-panda perception`."""
 
 import argparse
+import functools
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,6 +11,7 @@ from perception.loop import perception_runner
 from perception.models.cards import chosen
 from perception.pipeline import Perception
 from perception.segmentation.segmenter import choose_segmenter
+from rolling_panda.calibration.file import load, save
 from rolling_panda.config import RobotConfig, load_section
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.runtime.process import ProcessContext, run_process
@@ -39,7 +41,10 @@ def run(context: ProcessContext) -> None:
     config = load_section(context.config_path, "perception", PerceptionConfig)
     model = RobotModel(load_section(context.config_path, "robot", RobotConfig))
     segmenter = choose_segmenter(config.segmenter, network_file(config, context.arguments), config.threads)
-    perception_runner(context.transport, config, Perception(config, segmenter, model)).run(context.stopping)
+    folder, robot_id = context.state_folder, context.arguments.robot_id
+    mount = load(folder, robot_id, model)
+    perception = Perception(config, segmenter, model, mount, functools.partial(save, folder, robot_id))
+    perception_runner(context.transport, config, perception).run(context.stopping)
 
 
 if __name__ == "__main__":

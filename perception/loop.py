@@ -6,13 +6,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
+from msgspec.structs import replace
+
 from perception.config import PerceptionConfig
 from perception.pipeline import Perception
 from perception.segmentation.frame import CorruptFrameError
 from rolling_panda import messages as m
 from rolling_panda import reasons, topics
 from rolling_panda.errors import RollingPandaError
-from rolling_panda.messages.perception import CloseUpResult, Obstacles, SpurPicture
+from rolling_panda.messages.perception import CameraState, CloseUpResult, Obstacles, SpurPicture
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.transport.inbox import Inbox, Received, Reply, Request
 from rolling_panda.transport.runner import Runner, Wire
@@ -85,6 +87,7 @@ class _Output:
     pictures: tuple[SpurPicture, ...]
     rejected_wood: tuple[m.Reason, ...]
     reply: Reply | None
+    camera: CameraState
 
 
 class PerceptionProcess:
@@ -114,6 +117,9 @@ class PerceptionProcess:
         self._frame: Received[CameraFrame] | None = None
         self._submitted: Received[CameraFrame] | None = None
         self._sequence = 0
+        self._camera = perception.camera.state
+        self._camera_told: CameraState | None = None
+        self._camera_sent = -1e9
         self._obstacles_sent = self._picture_sent = self._rejected_logged = -1e9
         self._started = False
         self._last_error = ""
@@ -158,6 +164,7 @@ class PerceptionProcess:
             self._picture_cycle[key] = self._picture_cycle.pop(key)
             self._out.append(self._picture_cycle[key])
             self._picture_sent = now
+        self._tell_camera(now)
         self._beat(now)
         return self._out
 
@@ -171,7 +178,7 @@ class PerceptionProcess:
         self.wake()
 
     def _accept(self, output: _Output, now: float) -> None:
-        self._newest, self._last_error = output, ""
+        self._newest, self._last_error, self._camera = output, "", output.camera
         self._out.append(output.points)
         if output.reply is not None:
             self._out.append(output.reply)
@@ -194,6 +201,14 @@ class PerceptionProcess:
         self._out += new.values()
         kept = {key: picture for key, picture in self._picture_cycle.items() if key in wanted and key not in new}
         self._picture_cycle = kept | new
+
+    def _tell_camera(self, now: float) -> None:
+        """State of the camera: at once where it has changed, and again for those who come later."""
+        told = self._camera_told
+        changed = told is None or replace(self._camera, header=told.header) != told
+        if changed or now - self._camera_sent >= 1.0 / topics.CAMERA_STATE.rate_hz:
+            self._out.append(self._camera)
+            self._camera_told, self._camera_sent = self._camera, now
 
     def _log_refused(self, cause: m.Reason, now: float) -> None:
         # An error that repeats frame after frame is logged once.
@@ -232,4 +247,12 @@ def _work(perception: Perception, job: CameraFrame | Request, send: Callable[[Cl
             send(perception.check_close_up(job))
         points = perception.process(job)
     obstacles = Obstacles(header=points.header, capsules=perception.obstacles)
-    return _Output(points, perception.withdrawn, obstacles, perception.pictures, perception.rejected_wood, reply)
+    return _Output(
+        points,
+        perception.withdrawn,
+        obstacles,
+        perception.pictures,
+        perception.rejected_wood,
+        reply,
+        perception.camera.state,
+    )

@@ -9,6 +9,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from perception.arrays import Array, Labels, distance
+from perception.calibration.camera import CameraCalibration, Keep, keep_nothing
 from perception.config import PerceptionConfig, RuleConfig
 from perception.obstacles.cylinder_fit import Rejection
 from perception.obstacles.obstacle_map import ObstacleMap
@@ -39,8 +40,9 @@ from rolling_panda.commands import (
     PlantRequest,
     SetRule,
     UndoRule,
+    UseCamera,
 )
-from rolling_panda.messages.perception import Capsule, CloseUpResult, SpurPicture
+from rolling_panda.messages.perception import CALIBRATION, CameraMount, Capsule, CloseUpResult, SpurPicture
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.model.wire_values import vector3
@@ -83,17 +85,27 @@ class _RuleSnapshot:
 class Perception:
     """The perception pipeline. It has no clock and no thread: the same frames give the same points."""
 
-    def __init__(self, config: PerceptionConfig, segmenter: Segmenter, model: RobotModel | None = None) -> None:
+    def __init__(
+        self,
+        config: PerceptionConfig,
+        segmenter: Segmenter,
+        model: RobotModel | None = None,
+        mount: CameraMount | None = None,
+        keep: Keep = keep_nothing,
+    ) -> None:
         """Start with an unknown row.
 
         Args:
             config: Section `[perception]`.
             segmenter: Semantic segmentation.
-            model: The robot, for the camera pose. Its `data` is overwritten: do not share it with another thread.
+            model: The robot, for the camera pose. It is changed: do not share it.
+            mount: Calibration of the camera; None takes it to be where it is drawn.
+            keep: Keeps a new calibration beyond a restart.
         """
         self._config = with_width_bias(config, segmenter.width_bias)
         self.segmenter = segmenter
         self._model = model or RobotModel()
+        self.camera = CameraCalibration(self._model, mount, keep)
         self._tracker = Tracker(config.tracker)
         self._numbering = SpurNumbering(config.tracker.spur_separation, config.tracker.vine_spacing)
         self._frames = 0
@@ -124,6 +136,7 @@ class Perception:
             MovePoint: self._move,
             AddPoint: self._add,
             AddPointInImage: self._add_in_image,
+            UseCamera: self._use_camera,
         }
 
     def process(self, frame: CameraFrame) -> m.PruningPoints:
@@ -139,7 +152,8 @@ class Perception:
         self._stamp = view.stamp
         self.camera_rays.add(frame)
         self.withdrawn = ()
-        if -view.R[2, 1] < self._config.min_upright:
+        # The calibration's board hides the row.
+        if frame.point_id.startswith(CALIBRATION) or -view.R[2, 1] < self._config.min_upright:
             return self.points()
         try:
             labels = self.segmenter.segment(view)
@@ -203,6 +217,8 @@ class Perception:
         Raises:
             CorruptFrameError: The frame is corrupt; nothing changes.
         """
+        if frame.point_id.startswith(CALIBRATION):
+            return self.camera.look(frame)
         point = self._tracker.find(frame.point_id)
         if point is None:
             return failed_check(frame, reasons.point_unknown_to_perception())
@@ -263,6 +279,15 @@ class Perception:
             replace(point, wire_distance=wire, cordon_distance=cordon)
             for point, wire, cordon in zip(points, wires, cordons, strict=True)
         )
+
+    def _use_camera(self, request: UseCamera) -> m.Answer:
+        """Use another calibration. What was seen by the old one is forgotten, but for the obstacles."""
+        answer = self.camera.use(request.made_at)
+        if answer.ok:
+            self.withdrawn = self._tracker.withdraw_all()
+            self.plant_map, self._spur_pictures, self._undecided = PlantMap(), SpurPictures(), UndecidedSites()
+            self._undo, self._severed, self._cane_lines, self._site_messages = [], [], (), ()
+        return answer
 
     def _add(self, request: AddPoint) -> m.Answer:
         return self._place(Ray(np.array(request.origin), np.array(request.direction)), request.user)

@@ -30,6 +30,7 @@ from rolling_panda.messages.types import (
     Text,
     UnitVector3,
     Vector3,
+    WallTime,
 )
 from rolling_panda.mode_table import Event
 
@@ -114,6 +115,16 @@ class AddPointInImage(PlantRequest, frozen=True, kw_only=True):
     sequence: Count
     u: Annotated[float, Meta(ge=0.0, le=1.0)]
     v: Annotated[float, Meta(ge=0.0, le=1.0)]
+
+
+class UseCamera(PlantRequest, frozen=True, kw_only=True):
+    """Use the new calibration of the camera from now on. All points are looked for anew.
+
+    Attributes:
+        made_at: `made_at` of the calibration that the operator saw.
+    """
+
+    made_at: WallTime
 
 
 class MovePoint(PlantRequest, frozen=True, kw_only=True):
@@ -337,6 +348,10 @@ class LookAgain(Start, frozen=True, kw_only=True):
     spur: Annotated[int, Meta(ge=0, le=100000)]
 
 
+class CalibrateCamera(Start, frozen=True, kw_only=True):
+    """READY → AUTO. Look at the calibration's board from all around; the base stands still. It cuts nothing."""
+
+
 class Pause(Intent, frozen=True, kw_only=True):
     """AUTO or TELEOP → PAUSED."""
 
@@ -534,6 +549,7 @@ COMMANDS: Final[tuple[Command, ...]] = (
     ),
     Command(Survey, "mode", "/survey", control=True, event=Event.START, conditions=_WATCHED_MOTION),
     Command(LookAgain, "mode", "/look-again", control=True, event=Event.START, conditions=_WATCHED_MOTION),
+    Command(CalibrateCamera, "mode", "/camera/calibrate", control=True, event=Event.START, conditions=_WATCHED_MOTION),
     Command(Pause, "mode", "/pause", event=Event.PAUSE),
     Command(Resume, "mode", "/resume", control=True, event=Event.RESUME),
     Command(
@@ -588,6 +604,7 @@ COMMANDS: Final[tuple[Command, ...]] = (
     Command(AddPoint, "points", "/points/by-hand", process="perception"),
     Command(AddPointInImage, "points", "/points/by-hand-in-image", process="perception"),
     Command(MovePoint, "points", "/points/{point_id}/move", process="perception"),
+    Command(UseCamera, "mode", "/camera/use", process="perception", modes=("IDLE", "READY", "PAUSED")),
     Command(SetApproach, "points", "/points/{point_id}/approach", _approach),
     Command(
         ResetOrder,

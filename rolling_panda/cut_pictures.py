@@ -100,7 +100,7 @@ def box_of(close_up: CutCloseUp, model: RobotModel) -> Box | None:
 
     The cut is in the middle, so that a part of the picture may lie outside the frame.
     """
-    frame, k = close_up.frame, close_up.frame.intrinsics
+    frame, k = close_up.frame, model.lens(close_up.frame.intrinsics)
     camera = model.pose(configuration(frame.base, frame.position), model.camera_id)
     x, y, z = (np.array(close_up.position) - camera.translation) @ camera.rotation
     if z < _NEAREST:

@@ -2365,6 +2365,101 @@ def survey_returns(places: float) -> None:
     """The survey drives back; places to look at again: {places:.0f}."""
 
 
+@_reason("info", "")
+def calibration_few_views(seen: float, needed: float) -> None:
+    """The board was seen from {seen:.0f} places; it takes {needed:.0f}."""
+
+
+@_reason("warning", "let the base stand still, and calibrate again")
+def calibration_base_moved(distance: float) -> None:
+    """The base moved by {distance:.1f} mm between the pictures of the board."""
+
+
+@_reason("warning", "give the arm room to turn about more than one axis, and calibrate again")
+def calibration_axes_parallel(turn: float, needed: float) -> None:
+    """The pictures of the board are turned about one axis: {turn:.1f}° about a second one; it takes {needed:g}°."""
+
+
+@_reason("warning", "see that the board is flat, of the right size and does not move, and calibrate again")
+def calibration_error_high(pixels: float, limit: float) -> None:
+    """The board's corners are {pixels:.2f} px from where they should be; at most {limit:g} px are allowed."""
+
+
+@_reason("warning", "bring more light on the board, and calibrate again")
+def calibration_unsure(angle: float, shift: float, most_angle: float, most_shift: float) -> None:
+    """The calibration is uncertain by {angle:.2f}°, {shift:.1f} mm; allowed: {most_angle:.2f}°, {most_shift:g} mm."""
+
+
+@_reason("warning", "look whether the camera is on its bracket as drawn")
+def calibration_far(turn: float, shift: float) -> None:
+    """By the board the camera is {turn:.1f}° and {shift:.0f} mm from where it is drawn: too far to be believed."""
+
+
+@_reason("warning", "free the arm, and calibrate again")
+def calibration_blocked(cause: str) -> None:
+    """The calibration was stopped: the arm is held by {cause}."""
+
+
+@_reason("info", "")
+def board_seen(seen: float, places: float) -> None:
+    """The camera has looked at the board from {places:.0f} places and has seen it from {seen:.0f}."""
+
+
+@_reason("warning", "put the board 45 cm before the camera in its survey posture, and calibrate again")
+def board_unseen(places: float) -> None:
+    """The camera has looked from {places:.0f} places and has not seen the board."""
+
+
+@_reason("info", "")
+def board_not_in_picture() -> None:
+    """The board is not in this picture, or too little of it."""
+
+
+@_reason("info", "calibrate the camera first")
+def no_calibration_offered() -> None:
+    """There is no new calibration to use."""
+
+
+@_reason("warning", "see that the disk has room and can be written")
+def calibration_not_kept(cause: str) -> None:
+    """The calibration could not be written: {cause}."""
+
+
+@_reason("info", "")
+def calibration_used(turn: float, shift: float) -> None:
+    """The camera's new calibration is in use, {turn:.2f}° and {shift:.1f} mm from the old one; the row is seen anew."""
+
+
+@_reason("info", "")
+def withdrawn_for_calibration(point: str) -> None:
+    """{point} was withdrawn, as the camera has a new calibration."""
+
+
+@_reason("warning", "calibrate it, or use the calibration that is offered")
+def camera_looks_left(angle: float, sd: float) -> None:
+    """The camera looks {angle:.1f}° (± {sd:.1f}°) to the left of where it was calibrated."""
+
+
+@_reason("warning", "calibrate it, or use the calibration that is offered")
+def camera_looks_right(angle: float, sd: float) -> None:
+    """The camera looks {angle:.1f}° (± {sd:.1f}°) to the right of where it was calibrated."""
+
+
+@_reason("warning", "calibrate it, or use the calibration that is offered")
+def camera_looks_up(angle: float, sd: float) -> None:
+    """The camera looks {angle:.1f}° (± {sd:.1f}°) above where it was calibrated."""
+
+
+@_reason("warning", "calibrate it, or use the calibration that is offered")
+def camera_looks_down(angle: float, sd: float) -> None:
+    """The camera looks {angle:.1f}° (± {sd:.1f}°) below where it was calibrated."""
+
+
+@_reason("warning", "calibrate it again")
+def calibration_old(days: float) -> None:
+    """The camera was calibrated {days:.0f} days ago."""
+
+
 @_reason("warning", "")
 def survey_blind() -> None:
     """The survey has ended; perception has reported nothing."""

@@ -192,6 +192,10 @@ OBSTACLES = Topic(
     "perception/obstacles", perception.Obstacles, "perception", "controller, server", 1, "DATA_LOW", "DROP",
     "posts, trunks, cordons, wires and retained canes seen so far",
 )
+CAMERA_STATE = Topic(
+    "perception/camera", perception.CameraState, "perception", "server", 0.5, "DATA_LOW", "DROP",
+    "calibration of the camera and what is known against it; also at once on change", latched=True,
+)
 SCENERY = Topic(
     "scenery", perception.Scenery, "bridge", "server", 0.5, "BACKGROUND", "DROP",
     "the simulated row; for display only", latched=True,
@@ -203,8 +207,8 @@ REPLAY = Topic(
 
 TOPICS: tuple[Topic[Any], ...] = (
     MOTION, TOKEN, CUT, CLOSE_UP_REQUEST, STOP, TELEOP, JOINTS, ODOMETRY, BRIDGE, CONTROLLER, PLAN, REPORT, TIMELINE,
-    PROGRAM, HEARTBEAT, EVENT, CAMERA, PREVIEW, PREVIEW_MOTION, POINTS, PICTURES, CLOSE_UP, OBSTACLES, SCENERY,
-    PRESENCE, CONTROL, STOPS, HARDWARE_STOP, REPLAY,
+    PROGRAM, HEARTBEAT, EVENT, CAMERA, PREVIEW, PREVIEW_MOTION, POINTS, PICTURES, CLOSE_UP, OBSTACLES, CAMERA_STATE,
+    SCENERY, PRESENCE, CONTROL, STOPS, HARDWARE_STOP, REPLAY,
 )
 #: The topic of each type of message.
 TOPIC_OF: dict[type[Any], Topic[Any]] = {topic.message: topic for topic in TOPICS}
@@ -221,9 +225,9 @@ PLANT: Service[commands.PlantRequest] = Service(
     "service/plant",
     (
         commands.SetRule, commands.EvaluateRule, commands.UndoRule, commands.AddPoint,
-        commands.AddPointInImage, commands.MovePoint,
+        commands.AddPointInImage, commands.MovePoint, commands.UseCamera,
     ),
-    "perception", 2.0, "set, evaluate or undo a pruning rule; add or move a point by hand",
+    "perception", 2.0, "pruning rules, points by hand, and the calibration of the camera",
 )
 SEEK: Service[commands.SeekReplay] = Service(
     "service/seek", (commands.SeekReplay,), "controller", 1.0, "jump in, play or pause the recording, or set its speed",

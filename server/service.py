@@ -130,11 +130,10 @@ async def serve(
         config.max_body_bytes,
         None if access_options.users is None else Passwords(access_options.users),
     )
-    model = RobotModel()
     solids = build_solids()
     for name, wire in wires.items():
         app_state.robots[name] = _robot_context(
-            config, wire, model, solids, app_state, None if state is None else state / "pictures" / name
+            config, wire, RobotModel(), solids, app_state, None if state is None else state / "pictures" / name
         )
     own = {f"{access_options.scheme}://{name}:{port}" for name in ("127.0.0.1", "localhost")}
     origins = frozenset({*own, *config.origins})

@@ -28,6 +28,9 @@ _ANEW_S: Final = 2.0
 #: watchdog ends.
 _BRAKING_S: Final = 0.4
 
+#: What a pause interrupts, by its phase; a calibration is begun anew.
+_INTERRUPTED: dict[m.Phase, m.Interrupted] = {"SURVEY": "survey", "CALIBRATION": ""}
+
 
 class Supervisor:
     """The supervision state machine and its inputs. Call `update` with the inputs of each period, then `review`."""
@@ -133,7 +136,7 @@ class Supervisor:
 
     def _note_interruption(self, before: m.Mode) -> None:
         if before in modes.MOVING and self.mode in ("PAUSED", "PROTECTIVE_STOP"):
-            at_work: m.Interrupted = "survey" if self._movement.sequence.phase == "SURVEY" else "work"
+            at_work = _INTERRUPTED.get(self._movement.sequence.phase, "work")
             self.interrupted = "teleoperation" if before == "TELEOP" else at_work
         elif before in modes.MOVING or self.mode not in ("READY", "PAUSED", "PROTECTIVE_STOP"):
             self.interrupted = ""

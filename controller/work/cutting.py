@@ -20,6 +20,7 @@ from controller.config import ControllerConfig, WorkConfig
 from controller.motion.follower import Follower, Measured, MotionTimeout, Tracking, missed
 from controller.motion.tool_motion import Leg, ToolMotion
 from controller.whole_body.saturation import Saturation
+from controller.work.camera_views import CameraViews, Refusal
 from controller.work.close_up import CloseUpClient, PostCutCheck, camera_ready, not_as_accepted
 from controller.work.homing import Withdrawal
 from controller.work.point_queue import TOLD_MOVED, PointQueue
@@ -660,6 +661,23 @@ class Surveying(Stage):
         return self, self._survey.step(robot, now)
 
 
+class Calibrating(Stage):
+    """Looking at the calibration's board from all around."""
+
+    phase: m.Phase = "CALIBRATION"
+
+    def __init__(self, parts: Parts, views: CameraViews) -> None:
+        """With one round of pictures."""
+        super().__init__(parts)
+        self._views = views
+
+    def step(self, robot: Measured, now: float) -> Step:
+        """One period."""
+        if self._parts.ending:
+            return self, self._parts.brake(robot, self._parts.ending)
+        return self, self._views.step(robot, now)
+
+
 def _shift(motion: ToolMotion, position: Array) -> None:
     """Move a motion's goal to a position (3, m, odom), unless it is there already."""
     moved = position - motion.goal.translation
@@ -758,6 +776,13 @@ class CutSequence:
         parts.next_cut.forget()
         survey = Survey(parts.config, parts.follower, parts.saturation, parts.queue, distance, place)
         self._stage = Surveying(parts, survey)
+
+    def look_at_board(self, postures: tuple[Array, ...], refusal: Refusal) -> None:
+        """Start to look at the calibration's board from these postures of the arm (7, rad); `refusal` judges each."""
+        parts = self._parts
+        parts.next_cut.forget()
+        views = CameraViews(parts.config, parts.follower, parts.saturation, parts.close_ups, postures, refusal)
+        self._stage = Calibrating(parts, views)
 
     def finish_cut_and_pause(self, why: m.Reason | None) -> None:
         """With a reason: begin no further cut, leave the canes and pause. None continues the work."""

@@ -1,5 +1,6 @@
 """Motion sources by mode: cut sequence, teleoperation and homing. Permission is not decided here."""
 
+import numpy as np
 from msgspec import Struct
 
 from controller.config import ControllerConfig
@@ -9,6 +10,7 @@ from controller.motion.body import Body
 from controller.motion.follower import Measured, Tracking
 from controller.motion.teleoperation import Teleoperation
 from controller.whole_body.task import Method
+from controller.work.camera_views import view_postures
 from controller.work.cutting import CutSequence
 from controller.work.homing import Homing
 from controller.work.point_queue import PointQueue
@@ -82,6 +84,7 @@ class Movement:
         self.teleoperation = Teleoperation(
             config.teleoperation, config.work, body.follower, body.robot.drive, body.dt, self.posture_check.refusal
         )
+        self._view_postures = view_postures(RobotModel(robot_config), np.array(config.work.home))
         self._homing: Homing | None = None
         #: Tracking of the last step's motion; None without one.
         self.tracking: Tracking | None = None
@@ -106,6 +109,10 @@ class Movement:
         self.body.surroundings.work_at(self.sequence.places)
         self._clearance.update(inbox.newest(Obstacles))
         self.posture_check.update(inbox.newest(Obstacles))
+
+    def look_at_board(self) -> None:
+        """Begin to look at the calibration's board from all around."""
+        self.sequence.look_at_board(self._view_postures, self.posture_check.refusal)
 
     def go_home(self) -> None:
         """Begin to bring the arm home."""

@@ -149,7 +149,7 @@ def decode_frame(frame: CameraFrame, model: RobotModel) -> View:
     return View(
         sequence=frame.sequence,
         stamp=frame.header.stamp,
-        intrinsics=k,
+        intrinsics=model.lens(k),
         depth=counts.astype(np.float32) * np.float32(frame.depth_unit),
         labels=labels,
         color_jpeg=frame.color_jpeg,

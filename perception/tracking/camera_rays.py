@@ -50,7 +50,8 @@ class CameraRays:
             stored = self._frames.get(sequence)
         if stored is None:
             return None
-        k, base, position = stored
+        reported, base, position = stored
+        k = model.lens(reported)
         camera = model.pose(configuration(base, position), model.camera_id)
         col, row = u * k.width - 0.5, v * k.height - 0.5
         along = np.array([(col - k.cx) / k.fx, (row - k.cy) / k.fy, 1.0])

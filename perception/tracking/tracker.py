@@ -247,6 +247,13 @@ class Tracker:
             track.published = self._message(track)
             self._tracks.append(track)
 
+    def withdraw_all(self) -> tuple[m.Reason, ...]:
+        """Withdraw all points, since the camera has another calibration; returns the reason of each."""
+        gone = [track.published for track in self._tracks if track.published is not None]
+        self._withdrawn |= {point.point_id: point for point in gone}
+        self._tracks = []
+        return tuple(reasons.withdrawn_for_calibration(point.point_id) for point in gone)
+
     def find(self, point_id: str) -> m.PruningPoint | None:
         """The newest message of a point that is or was published; None if there was none."""
         return next((p for p in self.points() if p.point_id == point_id), None) or self._withdrawn.get(point_id)

@@ -11,7 +11,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from rolling_panda import __version__
-from rolling_panda.cli import demo, router, status
+from rolling_panda.cli import calibrate, demo, router, status
 from rolling_panda.errors import RollingPandaError
 from rolling_panda.runtime.launch import child_environment, python_command
 
@@ -58,6 +58,11 @@ _OWN: dict[str, tuple[Any, str, str]] = {
         router,
         "the router that the processes connect to",
         "Run the router that the processes connect to, until Ctrl-C.",
+    ),
+    "calibrate": (
+        calibrate,
+        "where the camera is on the arm: print the board, look at it from all around",
+        "Print the board of the calibration, or let the running robot look at it and place the camera on the arm.",
     ),
     "status": (
         status,

@@ -88,6 +88,7 @@ class PageState(PageMessage, frozen=True, kw_only=True):
             state.
         replay: The recording that is replayed; None with a robot.
         relaxed_limits: Safety limits that a process's configuration sets less strictly than usual.
+        camera_warning: What is wrong with the calibration of the camera; None if nothing is known.
         plain_wire: True if the wire has no TLS: every program on the robot's machine can move it.
     """
 
@@ -110,6 +111,7 @@ class PageState(PageMessage, frozen=True, kw_only=True):
     replay: ReplayState | None = None
     relaxed_limits: tuple[Reason, ...] = ()
     plain_wire: bool = False
+    camera_warning: Reason | None = None
 
 
 class PagePoint(Struct, frozen=True, forbid_unknown_fields=True):

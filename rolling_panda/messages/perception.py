@@ -1,7 +1,7 @@
 """Messages of perception: pruning points, pictures of spurs, close-ups and obstacles."""
 
 import hashlib
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 import msgspec
 from msgspec import Meta, Struct
@@ -20,10 +20,12 @@ from rolling_panda.messages.types import (
     Name,
     Need,
     NonNegative,
+    QuatXyzw,
     Reason,
     Text,
     UnitVector3,
     Vector3,
+    WallTime,
     WoodClass,
 )
 
@@ -279,6 +281,63 @@ class Capsule(Struct, frozen=True, forbid_unknown_fields=True):
     vine: Number = -1
     spur: Number = -1
     undecided: bool = False
+
+
+#: `point_id` of a picture of the board is this with its number, from 1.
+CALIBRATION: Final = "calibration:"
+
+
+class CameraMount(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Calibration of the camera on the hand.
+
+    Attributes:
+        position: Origin of the camera in the frame of the arm's flange, panda_link8 (m).
+        quat_xyzw: Its rotation there.
+        focal: Focal length as a multiple of the one that the camera reports.
+        source: `board`, or `work`: from wood that was seen from several places.
+        made_at: Time of the calibration.
+        views: Number of pictures, or of observations of wood.
+        pixels: Root mean square of the reprojection error (px); 0 for `work`.
+        angle_sd: Standard deviation of the direction in which it looks (rad).
+        shift_sd: Standard deviation of the position along each axis (m).
+    """
+
+    position: Vector3
+    quat_xyzw: QuatXyzw
+    focal: Annotated[float, Meta(ge=0.9, le=1.1)] = 1.0
+    source: Literal["board", "work"] = "board"
+    made_at: WallTime = 0.0
+    views: Count = 0
+    pixels: NonNegative = 0.0
+    angle_sd: NonNegative = 0.0
+    shift_sd: NonNegative = 0.0
+
+
+class CameraState(Message, frozen=True, kw_only=True):
+    """Perception → server: the camera's calibration, and what is known against it.
+
+    Attributes:
+        header: Stamp of the newest frame.
+        mount: The calibration in use; None while the camera is taken to be where it is drawn.
+        views: Pictures of the board since the last calibration began.
+        offer: A better calibration, which `UseCamera` takes; None without one.
+        refused: Why the last calibration gave no offer; None if it gave one, or before the first.
+        turned: Rotation of the camera against its calibration by ordinary work (rad, about its axes x right, y down, z
+            forward); None before enough was seen.
+        turned_sd: Standard deviation of that about each axis (rad).
+        observations: Close-ups that it is from.
+        warning: What is wrong with the calibration; None if nothing is known.
+    """
+
+    header: Header
+    mount: CameraMount | None = None
+    views: Count = 0
+    offer: CameraMount | None = None
+    refused: Reason | None = None
+    turned: Vector3 | None = None
+    turned_sd: Vector3 | None = None
+    observations: Count = 0
+    warning: Reason | None = None
 
 
 class Scenery(Message, frozen=True, kw_only=True):

@@ -34,7 +34,7 @@ PROCESSES: tuple[Process, ...] = ("bridge", "controller", "perception", "server"
 Mode = Literal["IDLE", "READY", "TELEOP", "AUTO", "PAUSED", "PROTECTIVE_STOP", "FAULT", "ESTOP_LATCHED"]
 #: Activity that a pause or a protective stop has interrupted and that nobody has resumed.
 Interrupted = Literal["", "work", "survey", "teleoperation"]
-Phase = Literal["", "APPROACH", "CLOSE_UP", "ADVANCE", "CUT", "RETREAT", "SURVEY"]
+Phase = Literal["", "APPROACH", "CLOSE_UP", "ADVANCE", "CUT", "RETREAT", "SURVEY", "CALIBRATION"]
 #: UNREACHABLE: accepted, but refused by the current plan; ACCEPTED again once a plan reaches it.
 PointState = Literal["PROPOSED", "ACCEPTED", "UNREACHABLE", "CUTTING", "DONE", "FAILED_NOT_CUT", "UNKNOWN", "REJECTED"]
 Severity = Literal["info", "warning", "error"]

@@ -8,6 +8,7 @@ import xml.etree.ElementTree as ET
 from dataclasses import dataclass
 from typing import Any
 
+import msgspec
 import numpy as np
 import pinocchio as pin
 from msgspec import Struct
@@ -15,6 +16,8 @@ from msgspec import Struct
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig
 from rolling_panda.errors import ModelError
+from rolling_panda.messages.perception import CameraMount
+from rolling_panda.messages.robot import Intrinsics
 from rolling_panda.model.differential_drive import NQ, Array, DifferentialDrive
 from rolling_panda.resources import panda_description, resource
 
@@ -60,8 +63,28 @@ class RobotModel:
         self.tool_id = self.frame_id("tool")
         self.camera_id = self.frame_id("camera")
         self.flange_id = self.frame_id("panda_link8")
+        #: The camera on the flange as drawn (pin.SE3).
+        self.T_flange_camera = self._on_flange.actInv(self.model.frames[self.camera_id].placement)
+        self._focal = 1.0
         self.drive = _drive(self.model, config)
         self.limits = _limits(self.model, config)
+
+    @property
+    def _on_flange(self) -> Any:
+        """The flange's pose in the frame of the last joint."""
+        return self.model.frames[self.flange_id].placement
+
+    def mount_camera(self, mount: CameraMount | None) -> None:
+        """Take the camera to be where its calibration has it; None takes it back to where it is drawn."""
+        T_flange_camera = self.T_flange_camera if mount is None else mount_pose(mount)
+        self.model.frames[self.camera_id].placement = self._on_flange * T_flange_camera
+        self._focal = 1.0 if mount is None else mount.focal
+
+    def lens(self, reported: Intrinsics) -> Intrinsics:
+        """The camera model that was calibrated, for the one that a frame reports."""
+        if self._focal == 1.0:
+            return reported
+        return msgspec.structs.replace(reported, fx=reported.fx * self._focal, fy=reported.fy * self._focal)
 
     def frame_id(self, name: str) -> int:
         """Index of a named frame.
@@ -137,6 +160,17 @@ def placement(pose: m.Pose) -> Any:
         raise ModelError(f"quat_xyzw {pose.quat_xyzw} has length {quaternion.norm():.3f}; it must be 1")
     quaternion.normalize()
     return pin.SE3(quaternion.toRotationMatrix(), np.array(pose.position))
+
+
+def mount_pose(mount: CameraMount) -> Any:
+    """T_flange_camera of a calibration (pin.SE3)."""
+    return placement(m.Pose(mount.position, mount.quat_xyzw))
+
+
+def turn_and_shift(T_a: Any, T_b: Any) -> tuple[float, float]:
+    """Angle (rad) and distance (m) between two poses (pin.SE3)."""
+    off = T_a.actInv(T_b)
+    return float(np.linalg.norm(pin.log3(off.rotation))), float(np.linalg.norm(off.translation))
 
 
 def _drive(model: Any, config: RobotConfig) -> DifferentialDrive:

@@ -13,6 +13,7 @@ from pydantic import BaseModel, Field
 from rolling_panda import reasons
 from rolling_panda.cut_pictures import Moment
 from rolling_panda.messages.page import Diagnostics, PageEvents, PagePoints, PageState
+from rolling_panda.messages.perception import CameraState
 from rolling_panda.messages.supervision import CutReport, SessionPlan, SessionReport, Timeline
 from rolling_panda.reasons import text_of
 from server.api.dependencies import Caller, PointId, activity
@@ -98,6 +99,14 @@ def state_router(robot: RobotContext) -> APIRouter:
         received = robot.link.timeline.peek()
         if received is None:
             return answer(Result(503, reasons.not_reported("controller")))
+        return message(received.message)
+
+    @router.get("/camera", tags=["state"], responses=query(CameraState, UNAVAILABLE))
+    async def camera(session: Caller) -> Response:
+        """The camera's calibration, the one on offer, and what is known against it."""
+        received = robot.link.camera_state.peek()
+        if received is None:
+            return answer(Result(503, reasons.not_reported("perception")))
         return message(received.message)
 
     @router.get("/diagnostics", tags=["state"], responses=query(Diagnostics))

@@ -73,6 +73,7 @@ class RobotLink:
         transport.subscribe(topics.PROGRAM, self._on_program)
         self.scenery = transport.slot(topics.SCENERY)
         self.obstacles = transport.slot(topics.OBSTACLES)
+        self.camera_state = transport.slot(topics.CAMERA_STATE)
         self.pictures = PictureStore()
         transport.subscribe(topics.PICTURES, lambda picture, at: self.pictures.add(picture))
         self.control = transport.slot(topics.CONTROL)

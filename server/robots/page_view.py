@@ -8,6 +8,7 @@ import numpy as np
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.messages.page import PagePlan, PagePoint, PagePoints, PageState
+from rolling_panda.messages.perception import CameraMount
 from rolling_panda.messages.robot import CameraFrame, JointState
 from rolling_panda.messages.supervision import SessionPlan
 from rolling_panda.messages.types import Role
@@ -36,13 +37,14 @@ class PageView:
 
         Args:
             link: To read from.
-            model: Projects points into the image.
+            model: Projects points into the image, by the camera's calibration; it is changed.
             relaxed_limits: Limits of the server that are set wider than usual.
             plain_wire: Whether the robot's wire is unencrypted.
         """
         self._relaxed_limits, self._plain_wire = relaxed_limits, plain_wire
         self._link = link
         self.model = model
+        self._mount: CameraMount | None = None
         self._seen: dict[str, m.PruningPoint] = {}
         self._built_from: tuple[object, ...] = ()
         self._built: PagePoints | None = None
@@ -59,6 +61,10 @@ class PageView:
         controller, bridge = self._link.controller.peek(), self._link.bridge.peek()
         replay = self._link.replay.peek()
         joints, odometry = self._link.joints.peek(), self._link.odometry.peek()
+        seeing = self._link.camera_state.peek()
+        if seeing is not None and seeing.message.mount != self._mount:
+            self._mount = seeing.message.mount
+            self.model.mount_camera(self._mount)
         camera, control = self._link.camera.peek(), self._link.control.peek()
         return PageState(
             number=number,
@@ -87,6 +93,7 @@ class PageView:
                 )
             ),
             plain_wire=self._plain_wire,
+            camera_warning=seeing.message.warning if seeing else None,
             speed_ratios=() if joints is None else speed_ratios(joints.message, self.model.limits),
         )
 
@@ -195,7 +202,7 @@ def project(
         return [None] * len(positions)
     camera = model.pose(configuration(frame.base, frame.position), model.camera_id)
     points = (np.array(positions) - camera.translation) @ camera.rotation
-    lens = frame.intrinsics
+    lens = model.lens(frame.intrinsics)
     pixels: list[tuple[float, float] | None] = []
     for x, y, z in points:
         if z < 0.05:

@@ -30,6 +30,7 @@ class CameraConfig(Struct, frozen=True, forbid_unknown_fields=True):
         calibration_angle: Standard deviation of the hand-eye calibration error (rad).
         color_noise: Standard deviation of the colour sensor's noise (of 255).
         color_blur: Standard deviation of its blur (px).
+        board: Whether the calibration's board stands before the camera where the robot starts.
         appearance: Variation of bark, light and exposure between seeds: 0 for none, 1 for one winter.
     """
 
@@ -46,6 +47,7 @@ class CameraConfig(Struct, frozen=True, forbid_unknown_fields=True):
     calibration_angle: Annotated[float, Meta(ge=0.0, le=0.1)] = 0.001
     color_noise: Annotated[float, Meta(ge=0.0, le=100.0)] = 3.0
     color_blur: Annotated[float, Meta(ge=0.0, le=10.0)] = 0.5
+    board: bool = False
     appearance: Annotated[float, Meta(ge=0.0, le=3.0)] = 1.0
 
     def ideal(self) -> "CameraConfig":

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bridge.core.picture import Picture, encode_picture
+from bridge.sim.camera.board import StandingBoard
 from bridge.sim.camera.config import CameraConfig
 from bridge.sim.camera.mesh import Floats, Indices, RodMesh
 from bridge.sim.camera.palette import Bytes, Palette
@@ -59,6 +60,7 @@ class Camera:
         # Rays have length 1 along the optical axis, so that their distances are depths.
         self._rays = np.stack([u, v, np.ones_like(u)], -1).reshape(-1, 3).astype(np.float32)
         self._lengths = np.linalg.norm(self._rays, axis=1)
+        self._board = StandingBoard(seed) if self.config.board else None
         self._row: Row | None = None
         self._mesh = RodMesh(Row(()))
 
@@ -92,9 +94,13 @@ class Camera:
         color[on_rod] = self._rod_color(rods, points)
         sky = ~on_ground & ~on_rod
         color[sky] = self._palette.sky(rays[sky, 2] / self._lengths[sky])
+        if self._board is not None:
+            on_board = self._board.draw(origin, rays, self.intrinsics.width, depth, color)
+            labels[on_board], own[on_board], on_rod[on_board] = 0, False, False
         shape = (self.intrinsics.height, self.intrinsics.width)
         rng = np.random.default_rng([self._seed, frame])
         pixel_width = np.full(len(rays), np.inf, np.float32)
+        rods = hits.rod[on_rod]
         pixel_width[on_rod] = self._mesh.width[rods] * np.float32(self.intrinsics.fx) / depth[on_rod]
         return RgbdImage(
             color_sensor(self.config, color.reshape(*shape, 3), rng.spawn(1)[0]),

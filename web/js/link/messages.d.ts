@@ -21,6 +21,8 @@ export type CutKind = "spur cut"|"renewal cut"|"cane cut"|"by hand";
 
 export type Need = "another look"|"operator";
 
+export type QuatXyzw = [number, number, number, number];
+
 export type UnitVector3 = [number, number, number];
 
 export type Vector3 = [number, number, number];
@@ -45,7 +47,7 @@ export type Outcome = ""|"DONE"|"FAILED_NOT_CUT"|"UNKNOWN";
 
 export type Interrupted = ""|"work"|"survey"|"teleoperation";
 
-export type Phase = ""|"APPROACH"|"CLOSE_UP"|"ADVANCE"|"CUT"|"RETREAT"|"SURVEY";
+export type Phase = ""|"APPROACH"|"CLOSE_UP"|"ADVANCE"|"CUT"|"RETREAT"|"SURVEY"|"CALIBRATION";
 
 export type PointState = "PROPOSED"|"ACCEPTED"|"UNREACHABLE"|"CUTTING"|"DONE"|"FAILED_NOT_CUT"|"UNKNOWN"|"REJECTED";
 
@@ -62,8 +64,6 @@ export type PreviewPhase = "none"|"waiting"|"rolling"|"ready"|"approved"|"expire
 export type ArmVelocities = [number, number, number, number, number, number, number];
 
 export type GizmoAxes = "tool"|"base"|"world";
-
-export type QuatXyzw = [number, number, number, number];
 
 export type Severity = "info"|"warning"|"error";
 
@@ -438,6 +438,8 @@ export interface PageState {
   relaxed_limits: Reason[];
   /** True if the wire has no TLS: every program on the robot's machine can move it. */
   plain_wire: boolean;
+  /** What is wrong with the calibration of the camera; None if nothing is known. */
+  camera_warning: Reason|null;
 }
 
 /** One point of a rollout of the work, with the motion to it and out again. */

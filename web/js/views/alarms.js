@@ -100,11 +100,12 @@ function ofMode({ controller }) {
 
 /** @param {PageState} state */
 function ofDevices(state) {
-  const { bridge, controller } = state;
+  const { bridge, camera_warning, controller } = state;
   const atWork = controller?.mode === "AUTO" || controller?.mode === "TELEOP";
   return [
     ...when(hardwareStopPressed(state), reason("emergency_stop_pressed")),
     ...when(bridge?.cutter === "jammed", reason("cutter_jammed")),
+    ...(camera_warning === null ? [] : [alarm(camera_warning)]),
     ...when(bridge?.watchdog && atWork && isLive("controller"), reason("commands_missing")),
   ];
 }

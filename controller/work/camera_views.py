@@ -1,0 +1,197 @@
+"""The postures from which the camera looks at the calibration's board, and the work that takes the pictures.
+
+The board stands about `BOARD_AHEAD` before the camera in the survey posture. Where exactly is not known, and need not
+be: each picture is used that shows it. The base stands still. The tool stays `_CLEAR` away from the board's plane.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from controller.config import ControllerConfig
+from controller.motion.follower import UNNAMED, ArmMotion, Follower, Measured, MotionTimeout
+from controller.whole_body.saturation import Saturation
+from controller.work.close_up import CloseUpClient
+from controller.work.homing import Homing
+from controller.work.step_result import StepResult
+from rolling_panda import reasons
+from rolling_panda.messages.perception import CALIBRATION
+from rolling_panda.messages.types import Reason
+from rolling_panda.model.differential_drive import NQ, Array
+from rolling_panda.model.robot import ARM_Q, RobotModel
+
+#: Distance of the board before the camera in the survey posture (m), and least distance of the tool from its plane (m).
+BOARD_AHEAD, _CLEAR = 0.45, 0.12
+#: Directions of view, and how far they are from square to the board (rad): its marks can still be read, and the views
+#: are turned enough to tell a turn about the optical axis.
+_DIRECTIONS, _TILT = 42, (math.radians(8.0), math.radians(48.0))
+#: Distances from the board (m), and turns about the optical axis (rad).
+_DISTANCES, _ROLLS = (0.42, 0.34, 0.54), tuple(math.radians(roll) for roll in (0.0, 35.0, -35.0, 60.0, -60.0))
+#: Angle between one direction and the next about the board's normal (rad), which spreads any number of them evenly.
+_GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
+#: Steps of the inverse kinematics, its damping, and the error that is left (m, rad).
+_STEPS, _DAMPING, _SOLVED = 40, 1e-3, 1e-3
+#: Distance to a joint's limit that is kept (rad).
+_MARGIN = 0.1
+#: The arm rests for this time before a picture (s), and is in place within this angle (rad).
+_REST_S, _NEAR = 0.4, 0.01
+
+Refusal = Callable[[Array, Array], Reason | None]
+
+
+def view_postures(robot: RobotModel, home: Array) -> tuple[Array, ...]:
+    """Postures of the arm (7, rad) with the camera on the board, in an order with short ways.
+
+    Args:
+        robot: Its `data` is overwritten.
+        home: Survey posture (7, rad).
+    """
+    q = np.zeros(NQ)
+    q[ARM_Q] = home
+    ahead = robot.pose(q, robot.camera_id)
+    board = ahead.translation + BOARD_AHEAD * ahead.rotation[:, 2]
+    found = []
+    for index in range(_DIRECTIONS):
+        tilt = _TILT[0] + (_TILT[1] - _TILT[0]) * math.sqrt((index + 0.5) / _DIRECTIONS)
+        about = index * _GOLDEN
+        lean = pin.exp3(tilt * np.array([math.cos(about), math.sin(about), 0.0]))
+        turn = pin.exp3(np.array([0.0, 0.0, _ROLLS[index % len(_ROLLS)]]))
+        rotation = ahead.rotation @ lean @ turn
+        place = board - _DISTANCES[index % len(_DISTANCES)] * rotation[:, 2]
+        posture = _posture(robot, q, pin.SE3(rotation, place))
+        if posture is None:
+            continue
+        there = q.copy()
+        there[ARM_Q] = posture
+        tool = robot.pose(there, robot.tool_id).translation
+        if float((board - tool) @ ahead.rotation[:, 2]) >= _CLEAR:
+            found.append(posture)
+    return _in_order(home, found)
+
+
+def _posture(robot: RobotModel, start: Array, T_odom_camera: Any) -> Array | None:
+    """Posture (7, rad) that brings the camera to a pose, from a configuration (12); None where there is none."""
+    q = start.copy()
+    limits = robot.limits.lower[ARM_Q] + _MARGIN, robot.limits.upper[ARM_Q] - _MARGIN
+    for _ in range(_STEPS):
+        off = pin.log6(robot.pose(q, robot.camera_id).actInv(T_odom_camera)).vector
+        if float(np.abs(off).max()) < _SOLVED:
+            return q[ARM_Q].copy()
+        J = pin.computeFrameJacobian(robot.model, robot.data, q, robot.camera_id, pin.LOCAL)[:, ARM_Q]
+        step = J.T @ np.linalg.solve(J @ J.T + _DAMPING * np.eye(6), off)
+        q[ARM_Q] = np.clip(q[ARM_Q] + step, *limits)
+    return None
+
+
+def _in_order(start: Array, postures: list[Array]) -> tuple[Array, ...]:
+    """Always the nearest next."""
+    left, here, out = list(postures), start, []
+    while left:
+        nearest = min(range(len(left)), key=lambda index: float(np.abs(left[index] - here).max()))
+        here = left.pop(nearest)
+        out.append(here)
+    return tuple(out)
+
+
+class CameraViews:
+    """One round of pictures of the board. Call `step` in each period until it is finished."""
+
+    def __init__(
+        self,
+        config: ControllerConfig,
+        follower: Follower,
+        saturation: Saturation,
+        close_ups: CloseUpClient,
+        postures: tuple[Array, ...],
+        refusal: Refusal,
+    ) -> None:
+        """Bind the parts.
+
+        Args:
+            config: Section `[controller]`.
+            follower: Follower for motions of the arm.
+            saturation: Braking to rest.
+            close_ups: Client for the pictures.
+            postures: Of `view_postures`.
+            refusal: Why the arm cannot be in a posture (7, rad) from a configuration (12); None if it can.
+        """
+        self._config, self._follower, self._saturation = config, follower, saturation
+        self._close_ups, self._refusal, self._dt = close_ups, refusal, 1.0 / config.rate_hz
+        self._left = list(enumerate(postures, 1))
+        self._all, self._seen = len(postures), 0
+        self._homing: Homing | None = Homing(config, follower, self._dt)
+        self._way: ArmMotion | None = None
+        self._timeout = MotionTimeout(config.work.reach_timeout_s, self._dt)
+        self._goal = np.array(config.work.home)
+        self._there_at: float | None = None
+        self._number = 0
+        self._asked = ""
+        self._skipped: Reason | None = None
+
+    def step(self, robot: Measured, now: float) -> StepResult:
+        """One period.
+
+        Args:
+            robot: Measured robot.
+            now: Monotonic time (s).
+        """
+        if self._homing is not None:
+            return self._home(robot)
+        if self._asked:
+            return self._look(robot, now)
+        if self._way is not None:
+            return self._move(robot, self._way, now)
+        if not self._left:
+            self._homing = Homing(self._config, self._follower, self._dt)
+            return StepResult(self._saturation.ramp(robot.sent))
+        number, posture = self._left.pop(0)
+        if (why := self._refusal(posture, robot.q)) is not None:
+            self._skipped = why
+            return StepResult(self._saturation.ramp(robot.sent))
+        self._number, self._goal, self._there_at = number, posture, None
+        self._way = ArmMotion(self._config.motion, robot.q[ARM_Q].copy(), posture)
+        self._timeout.start(self._way.duration)
+        return self._move(robot, self._way, now)
+
+    def _home(self, robot: Measured) -> StepResult:
+        """To the survey posture, before the first picture and after the last."""
+        homing = self._homing
+        assert homing is not None
+        xi = homing.step(robot)
+        if homing.blocked:
+            return StepResult(self._saturation.ramp(robot.sent), pause=reasons.calibration_blocked(homing.blocked))
+        if homing.done:
+            self._homing = None
+            if not self._left:
+                return StepResult(self._saturation.ramp(robot.sent), finished=True, summary=self._summary())
+        return StepResult(xi)
+
+    def _move(self, robot: Measured, way: ArmMotion, now: float) -> StepResult:
+        tracking = way.step(robot, self._follower, self._dt)
+        self._timeout.note(tracking)
+        self._timeout.over(tracking, now, 0.0)
+        if self._timeout.late(now):
+            # What holds the arm in one posture need not hold it on the way to the next.
+            self._way, self._skipped = None, reasons.calibration_blocked(tracking.reason or UNNAMED)
+        elif way.done and float(np.abs(robot.q[ARM_Q] - self._goal).max()) < _NEAR:
+            self._there_at = now if self._there_at is None else self._there_at
+            if now - self._there_at >= _REST_S:
+                self._way, self._asked = None, f"{CALIBRATION}{self._number}"
+                self._close_ups.ask(self._asked, "seen", now)
+        return StepResult(tracking.xi)
+
+    def _look(self, robot: Measured, now: float) -> StepResult:
+        answer = self._close_ups.answer(self._asked, now)
+        if answer is not None:
+            self._seen += answer.finding == "seen"
+            self._close_ups.forget(self._asked)
+            self._asked = ""
+        return StepResult(self._saturation.ramp(robot.sent))
+
+    def _summary(self) -> Reason:
+        if self._seen == 0 and self._skipped is not None:
+            return self._skipped
+        return reasons.board_seen(self._seen, self._all) if self._seen else reasons.board_unseen(self._all)

@@ -1,0 +1,1 @@
+"""Where the camera is on the hand: from pictures of a board, and a monitor from ordinary work."""

@@ -1,0 +1,143 @@
+"""The camera's calibration in use, and the next one: pictures of the board in, an offer out, which an operator takes.
+
+Nothing is used before an operator says so. What is refused leaves the calibration in use as it is.
+"""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from perception.calibration.board_view import BoardView, find_board
+from perception.calibration.hand_eye import CalibrationError, calibrate
+from perception.segmentation.frame import decode_frame
+from rolling_panda import messages as m
+from rolling_panda import reasons
+from rolling_panda.calibration.file import FARTHEST_SHIFT, FARTHEST_TURN, OLD_S
+from rolling_panda.messages.perception import CALIBRATION, CameraMount, CameraState, CloseUpResult
+from rolling_panda.messages.robot import CameraFrame
+from rolling_panda.model.robot import RobotModel, configuration, mount_pose, pose_message, turn_and_shift
+
+#: Keeps a calibration beyond a restart; raises OSError where it cannot.
+Keep = Callable[[CameraMount], None]
+
+
+class CameraCalibration:
+    """Owns what a model believes of its camera. Not thread-safe: it belongs to the pipeline."""
+
+    def __init__(
+        self, model: RobotModel, mount: CameraMount | None, keep: Keep, clock: Callable[[], float] = time.time
+    ) -> None:
+        """Use a calibration.
+
+        Args:
+            model: The robot, whose camera is mounted.
+            mount: Of an earlier start; None takes the camera to be where it is drawn.
+            keep: Called with a new one before it is used.
+            clock: Time of the day (s since 1970).
+        """
+        self._model, self._keep, self._clock = model, keep, clock
+        self._mount: CameraMount | None = None
+        self._offer: CameraMount | None = None
+        self._refused: m.Reason | None = None
+        self._views: dict[str, BoardView] = {}
+        self._stamp = 0.0
+        self._use(mount)
+
+    @property
+    def state(self) -> CameraState:
+        """State for people."""
+        return CameraState(
+            header=m.Header(self._stamp, "camera"),
+            mount=self._mount,
+            views=len(self._views),
+            offer=self._offer,
+            refused=self._refused,
+            warning=self._warning,
+        )
+
+    def look(self, frame: CameraFrame) -> CloseUpResult:
+        """Take in a picture of the board.
+
+        Args:
+            frame: As received. The first one of a calibration is number 1 in its `point_id`.
+
+        Raises:
+            CorruptFrameError: The frame is corrupt; nothing changes.
+        """
+        view = decode_frame(frame, self._model)
+        self._stamp = view.stamp
+        if frame.point_id == f"{CALIBRATION}1":
+            self._views, self._offer, self._refused = {}, None, None
+        base = frame.base.x, frame.base.y, frame.base.phi
+        flange = self._model.pose(configuration(frame.base, frame.position), self._model.flange_id)
+        found = find_board(view, frame.intrinsics, flange, np.array(base))
+        if found is not None:
+            self._views[frame.point_id] = found
+            self._solve()
+        return CloseUpResult(
+            header=m.Header(frame.header.stamp, "odom"),
+            point_id=frame.point_id,
+            number=frame.number,
+            finding="unseen" if found is None else "seen",
+            reason=reasons.board_not_in_picture() if found is None else None,
+        )
+
+    def use(self, made_at: float) -> m.Answer:
+        """Use the offered calibration from now on, and after a restart.
+
+        Args:
+            made_at: Of the offer that the operator saw.
+        """
+        offer = self._offer
+        if offer is None or offer.made_at != made_at:
+            return m.Answer(ok=False, reason=reasons.no_calibration_offered())
+        try:
+            self._keep(offer)
+        except OSError as error:
+            return m.Answer(ok=False, reason=reasons.calibration_not_kept(error.strerror or str(error)))
+        turn, shift = turn_and_shift(self._T_flange_camera, mount_pose(offer))
+        self._use(offer)
+        return m.Answer(ok=True, reason=reasons.calibration_used(float(np.degrees(turn)), 1e3 * shift))
+
+    @property
+    def _T_flange_camera(self) -> Any:
+        return self._model.T_flange_camera if self._mount is None else mount_pose(self._mount)
+
+    @property
+    def _warning(self) -> m.Reason | None:
+        age_s = 0.0 if self._mount is None else self._clock() - self._mount.made_at
+        return reasons.calibration_old(age_s / 86400.0) if age_s > OLD_S else None
+
+    def _use(self, mount: CameraMount | None) -> None:
+        self._mount, self._offer = mount, None
+        self._model.mount_camera(mount)
+
+    def _solve(self) -> None:
+        """The offer by all pictures so far, or why there is none."""
+        self._offer, self._refused = None, None
+        try:
+            found = calibrate(tuple(self._views.values()))
+        except CalibrationError as error:
+            self._refused = error.reason
+            return
+        turn, shift = turn_and_shift(self._model.T_flange_camera, found.T_flange_camera)
+        if turn > FARTHEST_TURN or shift > FARTHEST_SHIFT:
+            self._refused = reasons.calibration_far(float(np.degrees(turn)), 1e3 * shift)
+            return
+        pose = pose_message(found.T_flange_camera)
+        self._offer = CameraMount(
+            position=pose.position,
+            quat_xyzw=pose.quat_xyzw,
+            focal=found.focal,
+            made_at=self._clock(),
+            views=found.views,
+            pixels=found.pixels,
+            angle_sd=found.angle_sd,
+            shift_sd=found.shift_sd,
+        )
+
+
+def keep_nothing(mount: CameraMount) -> None:
+    """For a pipeline without a state folder."""

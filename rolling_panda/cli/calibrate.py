@@ -1,0 +1,171 @@
+"""`rolling-panda calibrate`: the board to print, and the camera's calibration by it.
+
+The arm is moved by the running program with all of its checks, as by a press of a button on the page. This command
+asks for it as a script does, watches, and shows the result.
+"""
+
+import argparse
+import getpass
+import math
+import time
+from pathlib import Path
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+import httpx
+
+from rolling_panda.errors import InputError, ServiceError
+
+#: Time between looks at the robot, and time limit of a calibration (s).
+_POLL_S, _LIMIT_S = 0.3, 300.0
+_DPI, _SQUARE_PX = 600, 240
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The two commands."""
+    kinds = parser.add_subparsers(dest="kind", metavar="WHAT", required=True)
+    board = kinds.add_parser("board", help="write the board as a PNG to print on A4 in its own size")
+    board.add_argument("--out", type=Path, default=Path("board.png"), help="file (default: %(default)s)")
+    camera = kinds.add_parser("camera", help="look at the board from all around, and place the camera on the arm by it")
+    camera.add_argument(
+        "page", help="a sign-in link of the page, which Invite makes and the demo prints; with --user its address alone"
+    )
+    camera.add_argument("--user", help="sign in by name and password in place of a link")
+    camera.add_argument("--yes", action="store_true", help="move, and use the result, without asking")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the command; returns 0 when a board was written or a calibration is in use, 1 without.
+
+    Raises:
+        InputError: The board cannot be written, or the link is none.
+        ServiceError: The page does not answer, or refuses.
+    """
+    return _write_board(arguments.out) if arguments.kind == "board" else _calibrate_camera(arguments)
+
+
+def _write_board(out: Path) -> int:
+    from PIL import Image
+
+    from rolling_panda.calibration.board import COLUMNS, MARGIN, ROWS, SQUARE, picture
+
+    pixels = round(SQUARE / 0.0254 * _DPI)
+    try:
+        Image.fromarray(picture(pixels)).save(out, dpi=(pixels / SQUARE * 0.0254,) * 2)
+    except (OSError, ValueError) as error:
+        raise InputError(f"cannot write the board to {out}: {error}; give a file that ends with .png") from error
+    size = [1e3 * (count * SQUARE + 2 * MARGIN) for count in (COLUMNS, ROWS)]
+    print(
+        f"{out}: {size[0]:.0f} by {size[1]:.0f} mm. Print it at 100 %, glue it on a flat plate, and measure a square:"
+    )
+    print(f"it must be {1e3 * SQUARE:.0f} mm wide. A wrong size is a wrong calibration.")
+    return 0
+
+
+def _calibrate_camera(arguments: argparse.Namespace) -> int:
+    with _Page(arguments.page, arguments.user) as page:
+        before = page.get("camera")
+        print(f"In use: {_told(before['mount'])}")
+        if not arguments.yes and not _agreed(
+            "Is the board 45 cm before the camera in its survey posture, and nobody near the arm? It will move."
+        ):
+            return 1
+        if page.get("state")["controller"]["mode"] == "IDLE":
+            page.post("arm")
+        page.post("camera/calibrate")
+        state = page.watch()
+        print(f"\n{page.reason_since()}")
+        result = page.get("camera")
+        offer = result["offer"]
+        if state["controller"]["mode"] != "READY" or offer is None:
+            print(f"No calibration: {page.words(result['refused'])}" if result["refused"] else "No calibration.")
+            print("The calibration in use stays as it is.")
+            return 1
+        print(f"New:    {_told(offer)}")
+        if not arguments.yes and not _agreed("Use it? All points are then looked for anew."):
+            return 1
+        print(page.post("camera/use", {"made_at": offer["made_at"]}))
+    return 0
+
+
+def _told(mount: dict[str, Any] | None) -> str:
+    if mount is None:
+        return "the camera is taken to be where it is drawn"
+    made = time.strftime("%Y-%m-%d %H:%M", time.localtime(mount["made_at"]))
+    return (
+        f"{made}, {mount['views']} views by {mount['source']}: error {mount['pixels']:.2f} px; "
+        f"standard deviation {math.degrees(mount['angle_sd']):.3f} degrees, {1e3 * mount['shift_sd']:.2f} mm; "
+        f"focal length x {mount['focal']:.4f}"
+    )
+
+
+def _agreed(question: str) -> bool:
+    return input(f"{question} [y/N] ").strip().lower() in ("y", "yes")
+
+
+class _Page:
+    """A session with the page's server."""
+
+    def __init__(self, link: str, user: str | None) -> None:
+        parts = urlsplit(link)
+        tokens = parse_qs(parts.query).get("token", [])
+        if not parts.scheme.startswith("http") or (not tokens and user is None):
+            raise InputError(f"{link!r} is no sign-in link; copy it from Invite on the page, or give --user NAME")
+        address = f"{parts.scheme}://{parts.netloc}"
+        self._client = httpx.Client(base_url=address, headers={"Origin": address}, timeout=10.0, trust_env=False)
+        body = {"token": tokens[0]} if user is None else {"user": user, "password": getpass.getpass()}
+        self.post("sign-in", body)
+
+    def __enter__(self) -> "_Page":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._client.close()
+
+    def get(self, what: str) -> Any:
+        """What `/api/…` tells."""
+        return self._ask("GET", what)
+
+    def post(self, what: str, body: dict[str, Any] | None = None) -> str:
+        """Ask for something; returns what the robot says to it."""
+        return str(self._ask("POST", what, body).get("reason", ""))
+
+    def watch(self) -> dict[str, Any]:
+        """Watch the robot until its work has ended; returns its state then."""
+        end = time.monotonic() + _LIMIT_S
+        while time.monotonic() < end:
+            time.sleep(_POLL_S)
+            state = self.get("state")
+            print(f"\r{self.get('camera')['views']} views of the board", end="", flush=True)
+            if state["controller"]["mode"] != "AUTO":
+                return dict(state)
+        self.post("pause")
+        raise ServiceError(f"the calibration has not ended within {_LIMIT_S:.0f} s; the robot was paused")
+
+    def reason_since(self) -> str:
+        """The newest line of the robot's log."""
+        events = self.get("events")["events"]
+        return str(events[-1]["text"]) if events else ""
+
+    def words(self, reason: dict[str, Any]) -> str:
+        """A reason in English."""
+        import msgspec
+
+        from rolling_panda.messages.types import Reason
+        from rolling_panda.reasons import text_of
+
+        return text_of(msgspec.convert(reason, Reason))
+
+    def _ask(self, method: str, what: str, body: dict[str, Any] | None = None) -> Any:
+        try:
+            answer = self._client.request(method, f"/api/{what}", json=body)
+        except httpx.HTTPError as error:
+            raise ServiceError(f"the page does not answer: {error}; is the address right?") from error
+        if answer.is_success:
+            return answer.json() if answer.content else {}
+        told = (
+            answer.json().get("reason", answer.text)
+            if "json" in answer.headers.get("content-type", "")
+            else answer.text
+        )
+        raise ServiceError(f"{what} was refused: {told}")

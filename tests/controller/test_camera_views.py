@@ -1,0 +1,75 @@
+"""The arm looks at the calibration's board from all around: the base stands still, each picture is taken at rest."""
+
+import numpy as np
+from msgspec.structs import replace
+
+from rolling_panda import commands as intents
+from rolling_panda.messages.perception import CALIBRATION, Capsule, CloseUpRequest
+from rolling_panda.model.robot import ARM_Q
+from tests.support.controller_at_work import CONFIG, finish, robot, run_until
+
+
+def calibrating(finding="seen", **changes):
+    """A robot that looks at the board, whose pictures end like this."""
+    r = robot(**changes)
+    pictures = []
+
+    def close_up(request: CloseUpRequest):
+        pictures.append((request.point_id, r.q.copy(), r.xi.copy()))
+        return replace(found(request), finding=finding)
+
+    found, r.close_up = r.close_up, close_up
+    r.step()
+    r.show(())
+    r.step()
+    assert r.ask(intents.Arm(user="ada")).ok
+    assert r.ask(intents.CalibrateCamera(user="ada")).ok
+    return r, pictures
+
+
+def test_it_takes_pictures_at_rest_from_many_directions_and_comes_home_and_leaves_out_those_among_obstacles():
+    r, pictures = calibrating()
+    run_until(r, lambda s: s is not None and s.mode == "AUTO", r.now + 1.0)
+    assert r.state.phase == "CALIBRATION"
+    finish(r, 240.0)
+    assert r.state.mode == "READY" and r.state.reason.code == "board_seen", r.state.reason
+    names = list(dict.fromkeys(name for name, _, _ in pictures))
+    assert len(names) >= 15 and names[0] == f"{CALIBRATION}1"
+    assert all(np.abs(xi).max() < 0.01 for _, _, xi in pictures), "the camera is at rest"
+    assert np.abs([q[:3] for _, q, _ in pictures]).max() < 1e-3, "the base stands still"
+    places = np.array([q[ARM_Q] for _, q, _ in pictures])
+    assert np.ptp(places, axis=0).max() > 0.8
+    assert np.abs(r.q[ARM_Q] - CONFIG.work.home).max() < 0.02 and not r.cuts
+    post = Capsule("post", (0.75, 0.28, 0.0), (0.75, 0.28, 2.0), 0.05, 0.05)
+    r, fewer = calibrating(obstacles=(post,))
+    finish(r, 240.0)
+    assert len({name for name, _, _ in fewer}) < len(names)
+
+
+def test_a_board_that_is_nowhere_is_told():
+    r, _ = calibrating(finding="unseen")
+    finish(r, 300.0)
+    assert r.state.mode == "READY" and r.state.reason.code == "board_unseen"
+
+
+def test_a_pause_ends_it_and_nothing_begins_it_again():
+    r, pictures = calibrating()
+    run_until(r, lambda s: len(pictures) > 3, 60.0)
+    assert r.ask(intents.Pause(user="ada")).ok
+    r.run(1.0)
+    assert r.state.mode == "PAUSED" and r.state.interrupted == ""
+    before = len(pictures)
+    assert r.ask(intents.Resume(user="ada")).ok
+    r.run(3.0)
+    assert r.state.mode == "READY" and len(pictures) == before and np.abs(r.xi).max() < 1e-3
+
+
+def test_it_needs_what_automatic_work_needs():
+    r = robot()
+    r.step()
+    assert not r.ask(intents.CalibrateCamera(user="ada")).ok, "not before Arm"
+    r.ask(intents.Arm(user="ada"))
+    r.perception = False
+    r.step()
+    refused = r.ask(intents.CalibrateCamera(user="ada"))
+    assert not refused.ok and refused.reason.code in ("process_silent", "process_gone")

@@ -1,0 +1,67 @@
+"""The file of the camera's calibration: read at the next start, and refused where it is not of this robot's camera."""
+
+import math
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from rolling_panda.calibration.file import FILE, load, save
+from rolling_panda.errors import ConfigError
+from rolling_panda.messages.perception import CameraMount
+from rolling_panda.messages.robot import Intrinsics
+from rolling_panda.model.robot import RobotModel, mount_pose, pose_message
+
+MODEL = RobotModel()
+
+
+def mount(turn=(0.01, -0.02, 0.005), shift=(0.003, 0.0, -0.004), **changes):
+    pose = pose_message(MODEL.T_flange_camera * pin.SE3(pin.exp3(np.array(turn)), np.array(shift)))
+    numbers = {"focal": 1.003, "made_at": 1.8e9, "views": 24, "pixels": 0.2, "angle_sd": 1e-5, "shift_sd": 2e-4}
+    return CameraMount(position=pose.position, quat_xyzw=pose.quat_xyzw, **(numbers | changes))
+
+
+def test_what_was_saved_is_read_at_the_next_start(tmp_path):
+    assert load(tmp_path, "rp1", MODEL) is None
+    save(tmp_path, "rp1", mount(views=3))
+    save(tmp_path, "rp1", mount())
+    assert load(tmp_path, "rp1", MODEL) == mount()
+
+
+@pytest.mark.parametrize(
+    ("spoil", "says"),
+    [
+        (lambda text: text.replace('"rp1"', '"rp2"'), "'rp2'"),
+        (lambda text: text.replace('robot = "rp1"', ""), "this is 'rp1'"),
+        (lambda text: text.replace("focal = 1.003", "focal = 1.3"), "focal"),
+        (lambda text: text.replace("focal = 1.003", "focus = 1.003"), "focus"),
+        (lambda text: text.replace("views", "= ="), "no calibration"),
+        (lambda text: text.replace("position = [", "position = [nan, "), "position"),
+        (lambda text: "", "position"),
+    ],
+)
+def test_a_file_of_another_robot_or_with_other_values_is_refused_with_what_to_do(tmp_path, spoil, says):
+    save(tmp_path, "rp1", mount())
+    path = tmp_path / FILE
+    path.write_text(spoil(path.read_text()))
+    with pytest.raises(ConfigError) as refused:
+        load(tmp_path, "rp1", MODEL)
+    assert says in str(refused.value) and "calibrate the camera again" in str(refused.value), refused.value
+
+
+@pytest.mark.parametrize("far", [{"turn": (0.0, 0.2, 0.0)}, {"shift": (0.06, 0.0, 0.0)}])
+def test_a_camera_far_from_where_it_is_drawn_is_refused(tmp_path, far):
+    save(tmp_path, "rp1", mount(**far))
+    with pytest.raises(ConfigError, match="from where it is drawn"):
+        load(tmp_path, "rp1", MODEL)
+
+
+def test_a_mounted_camera_and_its_lens_are_used_until_they_are_taken_off():
+    model, q = RobotModel(), np.zeros(12)
+    drawn, flange = model.pose(q, model.camera_id), model.pose(q, model.flange_id)
+    lens = Intrinsics(848, 480, 447.0, 447.0, 423.5, 239.5)
+    model.mount_camera(mount())
+    assert (flange * mount_pose(mount())).isApprox(model.pose(q, model.camera_id))
+    assert math.isclose(model.lens(lens).fx, 1.003 * 447.0) and model.lens(lens).cx == 423.5
+    model.mount_camera(None)
+    assert model.pose(q, model.camera_id).isApprox(drawn) and model.lens(lens) == lens
