@@ -36,6 +36,7 @@ from rolling_panda.commands import (
     AddPoint,
     AddPointInImage,
     EvaluateRule,
+    LeaveSite,
     MovePoint,
     PlantRequest,
     SetRule,
@@ -137,6 +138,7 @@ class Perception:
             AddPoint: self._add,
             AddPointInImage: self._add_in_image,
             UseCamera: self._use_camera,
+            LeaveSite: self._leave_site,
         }
 
     def process(self, frame: CameraFrame) -> m.PruningPoints:
@@ -320,6 +322,13 @@ class Perception:
         if isinstance(cut, m.Reason):
             return _refused(cut)
         return _done(self._tracker.move(request.point_id, cut).reason)
+
+    def _leave_site(self, request: LeaveSite) -> m.Answer:
+        if not self._undecided.leave(SpurNumber(request.vine, request.spur), request.left):
+            return _refused(reasons.site_unknown(request.vine, request.spur))
+        self._site_messages = self._undecided_sites()
+        told = reasons.site_left if request.left else reasons.site_reopened
+        return _done(told(request.vine, request.spur))
 
     def _set_rule(self, request: SetRule) -> m.Answer:
         rule = _with_numbers(self._config.rule, request.rule)

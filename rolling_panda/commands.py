@@ -139,6 +139,20 @@ class MovePoint(PlantRequest, frozen=True, kw_only=True):
     along: Annotated[float, Meta(ge=-0.1, le=0.1)]
 
 
+class LeaveSite(PlantRequest, frozen=True, kw_only=True):
+    """Leave an undecided site as it is, until something else is unclear there.
+
+    Attributes:
+        vine: Vine of the site.
+        spur: Spur of the site.
+        left: Whether it is left; False takes that back.
+    """
+
+    vine: Annotated[int, Meta(ge=1, le=100000)]
+    spur: Annotated[int, Meta(ge=0, le=100000)]
+    left: bool = True
+
+
 #: States of a point in which a command about it is possible.
 POINT_STATES: Final[dict[str, tuple[PointState, ...]]] = {
     "AcceptPoint": ("PROPOSED", "REJECTED", "FAILED_NOT_CUT"),
@@ -605,6 +619,7 @@ COMMANDS: Final[tuple[Command, ...]] = (
     Command(AddPointInImage, "points", "/points/by-hand-in-image", process="perception"),
     Command(MovePoint, "points", "/points/{point_id}/move", process="perception"),
     Command(UseCamera, "mode", "/camera/use", process="perception", modes=("IDLE", "READY", "PAUSED")),
+    Command(LeaveSite, "points", "/sites/leave", process="perception"),
     Command(SetApproach, "points", "/points/{point_id}/approach", _approach),
     Command(
         ResetOrder,

@@ -1,6 +1,7 @@
 """Catalogue of reasons: the code of each with its values, its severity, its English text and what to do.
 
 A reason is made by calling its function, so that the type checker compares the values. The docstring is the text.
+Besides formats of Python it may have words that go with a number: `{canes:cane|canes}` is "cane" for 1, else "canes".
 """
 
 from collections.abc import Callable
@@ -42,12 +43,23 @@ class Entry:
 CATALOGUE: Final[dict[str, Entry]] = {}
 
 
+class _Words(Formatter):
+    """Python's formats, and words for one and for several."""
+
+    def format_field(self, value: Any, format_spec: str) -> str:
+        one, several, other = format_spec.partition("|")
+        return str(super().format_field(value, format_spec)) if not several else one if value == 1 else other
+
+
+_WORDS: Final = _Words()
+
+
 def text_of(reason: Reason) -> str:
     """English text of a reason, with what to do. A code that this version does not know is shown with its values."""
     entry = CATALOGUE.get(reason.code)
     values = {name: text_of(value) if isinstance(value, Reason) else value for name, value in reason.values}
     try:
-        told = "" if entry is None else entry.text.format(**values)
+        told = "" if entry is None else _WORDS.vformat(entry.text, (), values)
     except (LookupError, TypeError, ValueError):
         entry = None
     if entry is None:
@@ -231,7 +243,7 @@ def decision_unrecorded(cause: Reason) -> None:
 
 @_reason("warning", "")
 def lines_unrecorded(lines: float) -> None:
-    """{lines:.0f} log lines of other processes exceeded the rate limit and were not recorded."""
+    """{lines:.0f} log {lines:line|lines} of other processes beyond the rate limit {lines:is|are} not recorded."""
 
 
 @_reason("error", "see whether its disk is full or hangs")
@@ -814,9 +826,9 @@ def limits_relaxed(limits: Reason) -> None:
     """Set wider than usual: {limits}."""
 
 
-@_reason("warning", "look at the plant, and say on the row whether it is cut")
+@_reason("warning", "look at the vine, and say in Review whether it is cut")
 def cuts_unknown(cuts: float) -> None:
-    """Cuts that ended unknown: {cuts:.0f}."""
+    """{cuts:.0f} {cuts:cut|cuts} ended unknown."""
 
 
 @_reason("warning", "close other programs")
@@ -1482,7 +1494,7 @@ def plain_wire() -> None:
 
 @_reason("warning", "")
 def lines_left_out(cause: Reason, lines: float) -> None:
-    """{cause} (and {lines:.0f} lines like it before)."""
+    """{cause} (and {lines:.0f} {lines:line|lines} like it before)."""
 
 
 # Labels
@@ -1516,12 +1528,12 @@ def bridge_state_set_aside(path: str) -> None:
 
 @_reason("info", "")
 def past_node(distance_mm: float, node: float) -> None:
-    """{distance_mm:.0f} mm past node {node:.0f}, so that {node:.0f} nodes and the basal bud stay."""
+    """{distance_mm:.0f} mm past node {node:.0f}, so that {node:.0f} {node:node|nodes} and the basal bud stay."""
 
 
 @_reason("info", "")
 def midway_past_node(distance_mm: float, node: float) -> None:
-    """{distance_mm:.0f} mm past node {node:.0f}, midway to the next: {node:.0f} nodes and the basal bud stay."""
+    """{distance_mm:.0f} mm past node {node:.0f}, midway on: {node:.0f} {node:node|nodes} and the basal bud stay."""
 
 
 @_reason("info", "")
@@ -1551,7 +1563,7 @@ def guyot_cut_upper(distance_mm: float, node: float) -> None:
 
 @_reason("info", "")
 def renewal_cut(others: float) -> None:
-    """Renewal cut: takes the old stub off with {others:.0f} other cane(s), just past the cane that stays."""
+    """Renewal cut: the old stub falls with {others:.0f} other {others:cane|canes}, just past the cane that stays."""
 
 
 @_reason("info", "")
@@ -1594,7 +1606,7 @@ def no_cane_followed() -> None:
 
 @_reason("info", "")
 def not_two_canes(canes: float) -> None:
-    """{canes:.0f} canes seen on the spur, and the Guyot rule is about two: left for a person."""
+    """{canes:.0f} {canes:cane|canes} seen on the spur, and the Guyot rule is about two: left for a person."""
 
 
 @_reason("info", "")
@@ -1679,12 +1691,12 @@ def wood_near_cut(kind: str, distance_mm: float) -> None:
 
 @_reason("info", "")
 def other_cane_left(why: Reason) -> None:
-    """The 1 other cane of this spur left for a person: {why}."""
+    """The other cane of this spur is left for a person: {why}."""
 
 
 @_reason("info", "")
 def other_canes_left(canes: float, why: Reason) -> None:
-    """The {canes:.0f} other canes of this spur left for a person: {why}."""
+    """The {canes:.0f} other canes of this spur are left for a person: {why}."""
 
 
 @_reason("info", "")
@@ -1719,7 +1731,7 @@ def stray_cane_hidden() -> None:
 
 @_reason("info", "check it yourself")
 def looks_exhausted(why: Reason, looks: float) -> None:
-    """{why}; {looks:.0f} looks from the front have not shown more."""
+    """{why}; {looks:.0f} {looks:look|looks} from the front {looks:has|have} not shown more."""
 
 
 @_reason("info", "go there, or is the camera covered, or its depth missing or in another unit?")
@@ -1763,6 +1775,16 @@ def canes_too_narrow(width: float, needed: float) -> None:
 @_reason("info", "decide about it")
 def point_placed(point: str) -> None:
     """{point} is placed."""
+
+
+@_reason("info", "")
+def site_left(vine: float, spur: float) -> None:
+    """Vine {vine:.0f}, spur {spur:.0f} stays as it is."""
+
+
+@_reason("info", "decide about it")
+def site_reopened(vine: float, spur: float) -> None:
+    """Vine {vine:.0f}, spur {spur:.0f} is to be decided again."""
 
 
 @_reason("warning", "drive there, with Survey for instance, and click again")
@@ -1837,17 +1859,17 @@ def rule_in_force() -> None:
 
 @_reason("info", "")
 def points_by_new_rule(points: float) -> None:
-    """{points:.0f} points by the new rule."""
+    """{points:.0f} {points:point|points} by the new rule."""
 
 
 @_reason("info", "")
 def points_by_that_rule(points: float) -> None:
-    """{points:.0f} points by that rule."""
+    """{points:.0f} {points:point|points} by that rule."""
 
 
 @_reason("info", "")
 def points_by_rule_before(points: float) -> None:
-    """{points:.0f} points by the rule before."""
+    """{points:.0f} {points:point|points} by the rule before."""
 
 
 @_reason("warning", "look again")
@@ -2138,12 +2160,12 @@ def none_so_confident(confidence: float) -> None:
 
 @_reason("warning", "")
 def none_acceptable(count: float, first: Reason) -> None:
-    """None of {count:.0f} points can be accepted; the first: {first}."""
+    """None of {count:.0f} {count:point|points} can be accepted; the first: {first}."""
 
 
 @_reason("info", "")
 def points_accepted(user: str, count: float, confidence: float) -> None:
-    """{user}: points accepted: {count:.0f}, of confidence {confidence:.2f} and more."""
+    """{user} accepted {count:.0f} {count:point|points} of confidence {confidence:.2f} and more."""
 
 
 @_reason("info", "")
@@ -2193,7 +2215,7 @@ def other_cane() -> None:
 
 @_reason("warning", "")
 def other_nodes_kept(before: float, now: float) -> None:
-    """It left {before:.0f} nodes when it was accepted, and leaves {now:.0f} now."""
+    """It left {before:.0f} {before:node|nodes} when it was accepted, and leaves {now:.0f} now."""
 
 
 @_reason("info", "")
@@ -2362,7 +2384,7 @@ def survey_blocked(cause: str) -> None:
 
 @_reason("info", "")
 def survey_returns(places: float) -> None:
-    """The survey drives back; places to look at again: {places:.0f}."""
+    """The survey drives back to look again at {places:.0f} {places:place|places}."""
 
 
 @_reason("info", "")
@@ -2467,7 +2489,9 @@ def survey_blind() -> None:
 
 @_reason("info", "")
 def surveyed(vines: float, spurs: float, points: float, unclear: float, asking: float) -> None:
-    """Vines {vines:.0f}, spurs {spurs:.0f}, points {points:.0f} seen; {unclear:.0f} unclear, {asking:.0f} to decide."""
+    """Seen: {vines:.0f} {vines:vine|vines}, {spurs:.0f} {spurs:spur|spurs}, {points:.0f} {points:point|points};
+    {unclear:.0f} unclear, {asking:.0f} to decide.
+    """  # noqa: D205
 
 
 @_reason("info", "")

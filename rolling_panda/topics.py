@@ -225,9 +225,9 @@ PLANT: Service[commands.PlantRequest] = Service(
     "service/plant",
     (
         commands.SetRule, commands.EvaluateRule, commands.UndoRule, commands.AddPoint,
-        commands.AddPointInImage, commands.MovePoint, commands.UseCamera,
+        commands.AddPointInImage, commands.MovePoint, commands.LeaveSite, commands.UseCamera,
     ),
-    "perception", 2.0, "pruning rules, points by hand, and the calibration of the camera",
+    "perception", 2.0, "pruning rules, points by hand, places that are left, and the calibration of the camera",
 )
 SEEK: Service[commands.SeekReplay] = Service(
     "service/seek", (commands.SeekReplay,), "controller", 1.0, "jump in, play or pause the recording, or set its speed",

@@ -62,17 +62,38 @@ class _Site:
     in_front: bool
 
 
+#: Code of a reason and those of its causes.
+_Kind = tuple[str, ...]
+
+
+def _kind(reason: m.Reason) -> _Kind:
+    causes = (value for _, value in reason.values if isinstance(value, m.Reason))
+    return (reason.code, *(code for cause in causes for code in _kind(cause)))
+
+
 class UndecidedSites:
-    """Newest reasons of each undecided spur, over all frames."""
+    """Newest reasons of each undecided spur, over all frames, and which of them an operator has left as they are."""
 
     def __init__(self) -> None:
         """Start without any."""
         self._sites: dict[SpurNumber, _Site] = {}
         self._observations: dict[SpurNumber, int] = {}
+        self._left: dict[SpurNumber, frozenset[_Kind]] = {}
 
     def clear(self) -> None:
         """Drop all reasons, after a change of the rule."""
         self._sites.clear()
+        self._left.clear()
+
+    def leave(self, number: SpurNumber, left: bool) -> bool:
+        """Leave a spur as it is for its present reasons, or take that back; False where nothing is undecided."""
+        site = self._sites.get(number)
+        if site is None:
+            return False
+        self._left.pop(number, None)
+        if left:
+            self._left[number] = frozenset(_kind(each.reason) for each in site.messages)
+        return True
 
     def update(
         self,
@@ -103,14 +124,17 @@ class UndecidedSites:
     def remaining(self, with_points: set[SpurNumber]) -> tuple[m.UndecidedSite, ...]:
         """All reasons in order of the spurs; those without a cut are omitted for spurs with a published point."""
         return tuple(
-            self._escalated(each, self._observations.get(number, 0))
+            self._with_need(each, number)
             for number, site in sorted(self._sites.items())
             if site.has_cuts or number not in with_points
             for each in site.messages
         )
 
-    def _escalated(self, site: m.UndecidedSite, observations: int) -> m.UndecidedSite:
-        """Passed on to an operator after enough observations."""
+    def _with_need(self, site: m.UndecidedSite, number: SpurNumber) -> m.UndecidedSite:
+        """Passed on to an operator after enough observations, and settled once one has left it."""
+        if _kind(site.reason) in self._left.get(number, ()):
+            return replace(site, needs="nothing")
+        observations = self._observations.get(number, 0)
         if site.needs != "another look" or observations < _MAX_OBSERVATIONS:
             return site
         return replace(site, needs="operator", reason=reasons.looks_exhausted(site.reason, observations))

@@ -68,9 +68,17 @@ def _changes(english: list[str], other: list[str], unsaid: set[str]) -> list[str
     for text, theirs in zip(texts, their_texts, strict=True):
         found += [f"it lacks {name}" for name in sorted(_placeholders(text) - _placeholders(theirs) - unsaid)]
         found += [f"it has {name} too many" for name in sorted(_placeholders(theirs) - _placeholders(text))]
+        found += [f"it has {words}, which are not one and several of a value" for words in _wrong_words(text, theirs)]
         found += ["a text is empty"] if bool(text) and not theirs else []
     return found
 
 
 def _placeholders(text: str) -> set[str]:
-    return set(re.findall(r"\{[^}]*\}", text))
+    return {found for found in re.findall(r"\{[^}]*\}", text) if "|" not in found}
+
+
+def _wrong_words(english: str, theirs: str) -> list[str]:
+    """Words that go with a number, as `{canes:tralcio|tralci}`; a language has its own."""
+    values = {re.split(r"\W", found[1:])[0] for found in _placeholders(english)}
+    words = [found for found in re.findall(r"\{[^}]*\}", theirs) if "|" in found]
+    return [each for each in words if each[1:].split(":")[0] not in values or each.count("|") != 1]

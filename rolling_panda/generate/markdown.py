@@ -258,8 +258,14 @@ def reasons_table() -> str:
     """One row for each reason, by code."""
     entries = sorted(CATALOGUE.values(), key=lambda entry: entry.code)
     # As code, since Markdown's `attr_list` takes a bare `{why}` at the end of a cell for an attribute of the cell.
-    rows = [(f"`{entry.code}`", entry.severity, _VALUE.sub(r"`\g<0>`", entry.text), entry.act) for entry in entries]
+    rows = [(f"`{entry.code}`", entry.severity, _VALUE.sub(_as_code, entry.text), entry.act) for entry in entries]
     return table(("code", "severity", "text", "what to do"), rows)
+
+
+def _as_code(value: re.Match[str]) -> str:
+    """A value as code; of words for one and for several the latter."""
+    _, several, words = value[0].strip("{}").partition("|")
+    return words if several else f"`{value[0]}`"
 
 
 BLOCKS: dict[str, Callable[[], str]] = {

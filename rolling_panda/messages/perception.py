@@ -105,7 +105,7 @@ class UndecidedSite(Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         reason: Reason.
-        needs: Another look by the camera, or a decision by the operator.
+        needs: Another look by the camera, or a decision by the operator; nothing where one has left it as it is.
         vine: Number of the vine; 0 for no particular spur.
         spur: Number of the spur on that vine; 0 for no particular spur.
         position: Position of the spur in odom (m), if known.

@@ -39,7 +39,7 @@ Phase = Literal["", "APPROACH", "CLOSE_UP", "ADVANCE", "CUT", "RETREAT", "SURVEY
 PointState = Literal["PROPOSED", "ACCEPTED", "UNREACHABLE", "CUTTING", "DONE", "FAILED_NOT_CUT", "UNKNOWN", "REJECTED"]
 Severity = Literal["info", "warning", "error"]
 Outcome = Literal["", "DONE", "FAILED_NOT_CUT", "UNKNOWN"]
-Need = Literal["another look", "operator"]
+Need = Literal["another look", "operator", "nothing"]
 WoodClass = Literal[
     "background", "ground", "post", "trunk", "cordon", "spur", "cane", "node", "wire", "hose", "old cut"
 ]

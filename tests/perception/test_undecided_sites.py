@@ -50,6 +50,27 @@ def test_what_was_seen_from_before_a_place_is_not_taken_back_from_aside():
     assert sites.remaining(set()) == ()
 
 
+def test_what_an_operator_leaves_needs_nothing_until_something_else_is_unclear_there():
+    sites = UndecidedSites()
+    assert not sites.leave(FIRST, True), "nothing is undecided there"
+    sites.update(FIRST, False, [reasons.nodes_lacking(0, 2)])
+    sites.update(SECOND, False, [ALIKE])
+    assert sites.leave(FIRST, True)
+    assert [each.needs for each in sites.remaining(set())] == ["nothing", "operator"]
+    for _ in range(20):
+        # Other numbers, and many looks, are no other matter.
+        sites.update(FIRST, False, [reasons.nodes_lacking(1, 2)])
+    assert [each.needs for each in sites.remaining(set())] == ["nothing", "operator"]
+    sites.update(FIRST, False, [reasons.nodes_lacking(1, 2), ALIKE])
+    assert [each.needs for each in sites.remaining(set())] == ["nothing", "operator", "operator"]
+    assert sites.leave(FIRST, True) and sites.leave(FIRST, False)
+    assert "nothing" not in [each.needs for each in sites.remaining(set())]
+    sites.leave(SECOND, True)
+    sites.clear()
+    sites.update(SECOND, False, [ALIKE])
+    assert [each.needs for each in sites.remaining(set())] == ["operator"], "another rule asks again"
+
+
 def test_looks_enough_from_before_a_place_leave_it_to_a_person():
     sites = UndecidedSites()
     for looks in range(1, 15):

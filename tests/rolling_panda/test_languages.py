@@ -66,12 +66,24 @@ def test_a_language_needs_both_files(folder: Path) -> None:
             "reasons.pl.json: stale: it has {age:.1f} too many",
         ),
         ({}, {"stale": ["error", "sprzed {age:.1f} s", ""]}, "reasons.pl.json: stale: a text is empty"),
+        *(
+            (
+                {},
+                {"stale": ["error", f"sprzed {{age:.1f}} {words}", "czekaj"]},
+                f"reasons.pl.json: stale: it has {words}, which are not one and several of a value",
+            )
+            for words in ("{ages:sekundy|sekund}", "{age:a|b|c}")
+        ),
     ],
 )
 def test_what_differs_from_english_is_told(
     folder: Path, page: dict[str, Any], reasons: dict[str, Any], problem: str
 ) -> None:
     assert translated(folder, page, reasons) == [problem]
+
+
+def test_a_language_has_words_for_one_and_several_where_it_needs_them(folder: Path) -> None:
+    assert translated(folder, {}, {"stale": ["error", "sprzed {age:.1f} {age:sekundy|sekund}", "czekaj"]}) == []
 
 
 def test_another_format_of_a_number_is_told(folder: Path) -> None:

@@ -143,6 +143,11 @@ def test_a_reason_survives_the_wire_and_has_its_values_in_the_text():
     assert all(str(value) in text for _, value in reason.values)
 
 
+def test_words_go_with_their_number():
+    one, three = (reasons.text_of(reasons.renewal_cut(others)) for others in (1, 3))
+    assert "with 1 other cane, just" in one and "with 3 other canes, just" in three
+
+
 def test_a_cause_is_data_too_and_its_text_stands_in_the_place_of_the_value():
     reason = reasons.said(reasons.control_held("ada"))
     assert msgspec.msgpack.decode(msgspec.msgpack.encode(reason), type=Reason) == reason
@@ -165,7 +170,12 @@ def test_a_number_has_a_format_and_nothing_else_has_one():
     made = [each for each in tree.body if isinstance(each, ast.FunctionDef) and each.name in reasons.CATALOGUE]
     assert len(made) == len(reasons.CATALOGUE)
     for function in made:
-        formats = {name: form for _, name, form, _ in Formatter().parse(reasons.CATALOGUE[function.name].text) if name}
+        found = [
+            (name, form or "") for _, name, form, _ in Formatter().parse(reasons.CATALOGUE[function.name].text) if name
+        ]
+        formats = {name: form for name, form in found if "|" not in form}
+        # Words for one and for several go with a number that is told.
+        assert {name for name, form in found if "|" in form} <= {name for name, form in formats.items() if form}
         for argument in function.args.args:
             is_number = ast.unparse(argument.annotation) == "float"
             assert bool(re.fullmatch(r"\.\df|g", formats[argument.arg])) == is_number, (function.name, argument.arg)

@@ -8,6 +8,7 @@ from rolling_panda.commands import (
     AddPoint,
     AddPointInImage,
     EvaluateRule,
+    LeaveSite,
     MovePoint,
     RestoreAccepted,
     SetRule,
@@ -56,6 +57,7 @@ def server(running):
             {"origin": [0.0, -0.5, 1.0], "direction": [0.0, 1.0, 0.0]},
             AddPoint(user="ann", origin=(0.0, -0.5, 1.0), direction=(0.0, 1.0, 0.0)),
         ),
+        ("sites/leave", {"vine": 2, "spur": 3}, LeaveSite(user="ann", vine=2, spur=3)),
         ("points/p4/move", {"along": -0.005}, MovePoint(user="ann", point_id="p4", along=-0.005)),
         (
             "points/by-hand-in-image",

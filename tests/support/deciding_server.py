@@ -1,4 +1,4 @@
-"""A played server that decides about points as the robot does: what has changed is refused."""
+"""A played server that decides about points and places as the robot does: what has changed is refused."""
 
 import msgspec
 from starlette.responses import JSONResponse, Response
@@ -14,9 +14,11 @@ _BECOMES: dict[str, m.PointState] = {"accept": "ACCEPTED", "reject": "REJECTED",
 
 
 class DecidingServer(PlayedServer):
-    """Decides about points."""
+    """Decides about points and places."""
 
     def answer(self, request: PlayedRequest) -> Response | None:
+        if request.path == "/api/sites/leave" and self.online:
+            return self._leave(request)
         kind, _, action = request.path.removeprefix("/api/points/").partition("/")
         if request.method != "POST" or action not in _BECOMES or not self.online:
             return super().answer(request)
@@ -29,6 +31,17 @@ class DecidingServer(PlayedServer):
         state = _BECOMES[action]
         said = reasons.said(request.body["reason"]) if action == "reject" and request.body["reason"] else None
         self.put(msgspec.structs.replace(row, entry=msgspec.structs.replace(row.entry, state=state, reason=said)))
+        return JSONResponse(outcome(True))
+
+    def _leave(self, request: PlayedRequest) -> Response:
+        self.posted.append((request.path, request.body))
+        vine, spur = request.body["vine"], request.body["spur"]
+        needs: m.Need = "nothing" if request.body["left"] else "operator"
+        self.undecided_sites = tuple(
+            msgspec.structs.replace(each, needs=needs) if (each.vine, each.spur) == (vine, spur) else each
+            for each in self.undecided_sites
+        )
+        self.tell(self.page_points())
         return JSONResponse(outcome(True))
 
     def put(self, *rows: PagePoint) -> None:

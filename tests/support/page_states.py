@@ -205,7 +205,7 @@ def _preview(page: Page, server: PlayedServer) -> None:
     server.tell(p.PagePreview(preview=state))
     page.locator("#show-preview").click()
     page.locator("#preview-time").fill("6.2")
-    expect(page.locator(".preview-words")).to_contain_text("p2: ")
+    expect(page.locator(".preview-words")).to_contain_text("2: ")
 
 
 def _preview_expired(page: Page, server: PlayedServer) -> None:

@@ -47,7 +47,7 @@ def test_a_greyed_button_does_nothing_and_says_why_to_a_finger(page: Page, serve
     expect(page.locator(".toast")).to_contain_text(text_of(refused))
     choose(page, "p3")
     page.locator("#review-accept").click(force=True)
-    expect(page.locator(".toast").last).to_contain_text("p3 is Done")
+    expect(page.locator(".toast").last).to_contain_text("Vine 1, spur 2 is Done")
     server.controller = controller("ESTOP_LATCHED")
     expect(page.locator("#reset")).to_have_attribute("aria-disabled", "true")
     page.locator("#reset-reason").press("Enter")

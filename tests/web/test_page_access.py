@@ -120,7 +120,7 @@ def test_signing_in_needs_no_eyes(tab: Page, server: PlayedServer, axe: str) -> 
 #: What is smaller than a fingertip; a tick is pressed by its words too.
 SMALL = """all => all.flatMap(each => {
   const box = (each.type === "checkbox" ? each.closest("label") : each).getBoundingClientRect();
-  return Math.min(box.width, box.height) < 43.5 ? [`${each.outerHTML.slice(0, 90)}: ${box.width}×${box.height}`] : [];
+  return Math.min(box.width, box.height) < 47.5 ? [`${each.outerHTML.slice(0, 90)}: ${box.width}×${box.height}`] : [];
 })"""
 
 

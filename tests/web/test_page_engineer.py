@@ -8,6 +8,7 @@ from playwright.sync_api import Locator, Page, expect
 
 from rolling_panda import messages as m
 from tests.support.page_parts import open_screen
+from tests.support.played_page import box_of
 from tests.support.played_server import PlayedServer, bridge, diagnostics
 
 pytestmark = pytest.mark.browser
@@ -48,6 +49,31 @@ def test_panels_are_moved_hidden_shown_and_remembered_by_keys_alone(page: Page, 
     page.reload()
     expect(page.locator("rp-engineer > section").first).to_be_visible()
     assert order(page) == USUAL
+
+
+def drag(page: Page, panel: str, to: str) -> None:
+    """Drag a panel by its title onto another one."""
+    title = box_of(page.locator(f'[data-panel="{panel}"] h2'))
+    goal = box_of(page.locator(f'[data-panel="{to}"] h2'))
+    page.mouse.move(title["x"] + 10, title["y"] + 10)
+    page.mouse.down()
+    page.mouse.move(title["x"] + 30, title["y"] + 20, steps=3)
+    page.mouse.move(goal["x"] + 20, goal["y"] + 10, steps=4)
+    page.mouse.up()
+
+
+def test_a_panel_is_dragged_by_its_title_to_the_place_of_another(page: Page, server: PlayedServer) -> None:
+    open_screen(page, "engineer")
+    drag(page, "alarms", "telemetry")
+    assert order(page) == ["processes", "telemetry", "alarms", *USUAL[3:]]
+    drag(page, "alarms", "processes")
+    assert order(page) == USUAL
+    drag(page, "alarms", "alarms")
+    assert order(page) == USUAL
+    drag(page, "processes", "alarms")
+    page.reload()
+    expect(page.locator("rp-engineer > section").first).to_be_visible()
+    assert order(page)[:2] == ["processes", "alarms"]
 
 
 @pytest.mark.parametrize(

@@ -46,7 +46,8 @@ WORDS = """() => {
 
 def translated(text: str) -> str:
     """A text in other letters, apart from its values; what a person has said is put in quotes."""
-    parts = re.split(r"(\{[^}]*\})", text)
+    # A number's words for one and for several are no value.
+    parts = re.split(r"(\{\w+:(?=[^}]*\|)|\{[^}|]*\})", text)
     return "".join(part if part.startswith("{") else part.translate(LETTERS) for part in parts)
 
 

@@ -65,7 +65,7 @@ def test_what_the_plan_refuses_neither_looks_accepted_nor_is_counted_so(page: Pa
     review = choose(page, "p2")
     expect(review.locator(".review-state")).to_have_text("Cannot reach")
     expect(page.locator("#review-accept")).to_have_attribute(
-        "title", re.compile("^p2 is accepted, and cannot be reached: No posture of the arm reaches it")
+        "title", re.compile("^Vine 1, spur 1 is accepted, and cannot be reached: No posture of the arm reaches it")
     )
     # It can be taken off; where it is the only one nothing can be started, for that reason.
     page.locator("#review-leave").click()

@@ -96,9 +96,9 @@ def test_it_says_how_long_and_how_near_and_the_scrubber_shows_moments(page: Page
     slider = page.get_by_label("Moment of the preview")
     slider.fill("2")
     until(page, lambda: 2.0 in moments(server))
-    expect(words).to_contain_text("p1: cut · least 72 mm")
+    expect(words).to_contain_text("Vine 1, spur 1: cut · least 72 mm")
     slider.fill("7")
-    expect(words).to_contain_text("p2: cut · least 62 mm")
+    expect(words).to_contain_text("Vine 1, spur 1: cut · least 62 mm")
     page.locator("#preview-hide").click()
     until(page, lambda: moments(server)[-1] is None)
     # The ghost is out of the way of the work, too.

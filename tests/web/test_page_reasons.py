@@ -9,6 +9,7 @@ from playwright.sync_api import Page, expect
 from rolling_panda import reasons
 from rolling_panda.messages import Reason
 from server.api.responses import outcome
+from tests.support.page_parts import open_screen
 from tests.support.played_server import PlayedServer
 
 pytestmark = pytest.mark.browser
@@ -23,7 +24,7 @@ TEXTS = """async reasons => {
   const { reasonText } = await import("/js/state/reasons.js");
   return reasons.map(reason => reasonText(reason));
 }"""
-NUMBERS = (0.0, 2.0, -3.26, 7.149, 1234.5678, 1e-3, 0.1 + 0.2)
+NUMBERS = (0.0, 1.0, 2.0, -3.26, 7.149, 1234.5678, 1e-3, 0.1 + 0.2)
 
 
 def shown(page: Page, made: list[Reason]) -> list[str]:
@@ -50,6 +51,32 @@ def test_a_cause_is_part_of_the_text(server: PlayedServer, page: Page) -> None:
 def test_a_reason_of_another_version_is_shown_with_its_values(server: PlayedServer, page: Page) -> None:
     (text,) = shown(page, [Reason(code="of_tomorrow", values=(("distance", 3.5), ("user", "ada")))])
     assert all(part in text for part in ("of_tomorrow", "distance", "3.5", "ada"))
+
+
+def test_points_are_called_by_vine_and_spur_also_when_they_are_gone(server: PlayedServer, page: Page) -> None:
+    made = [
+        reasons.point_unseen("p3"),
+        reasons.point_left("p3", reasons.revised("p1")),
+        reasons.acceptances_restored("p1, p3"),
+        reasons.point_moved_before("Ada", "p3", "p1"),
+        reasons.point_unseen("p99"),
+        # A person may be called like a point.
+        reasons.control_given("p3"),
+    ]
+    told = [
+        "Perception does not see vine 1, spur 2 any more",
+        "Vine 1, spur 2 was left: Vine 1, spur 1 was revised",
+        "Accepted again after the rule was undone: vine 1, spur 1; vine 1, spur 2",
+        "Ada moved vine 1, spur 2 before vine 1, spur 1",
+        "Perception does not see p99 any more",
+        "p3 holds control",
+    ]
+    assert shown(page, made) == told
+    server.points = ()
+    server.tell(server.page_points())
+    open_screen(page, "review")
+    expect(page.locator(".strip-mark")).to_have_count(2)
+    assert shown(page, made) == told
 
 
 def test_modes_and_states_have_their_labels(server: PlayedServer, page: Page) -> None:

@@ -171,7 +171,8 @@ def test_a_press_decides_and_the_next_one_to_decide_comes_by_itself(page: Page, 
     expect(review.locator(".review-done")).to_have_count(0)
     page.keyboard.press("r")
     expect(page.locator(".review-done")).to_have_text("All is decided: 3 to cut, 3 left.")
-    assert len(server.posted) == 3, "a place that is left needs no robot"
+    left = [body for path, body in server.posted if path == "/api/sites/leave"]
+    assert left == [{"vine": 1, "spur": spur, "left": True} for spur in (4, 3)]
 
 
 def test_why_it_was_left_can_be_said_and_need_not(page: Page, server: DecidingServer) -> None:
@@ -381,6 +382,18 @@ def test_another_look_is_asked_for_at_a_place(page: Page, server: DecidingServer
     until(page, lambda: server.posted == [("/api/look-again", {"vine": 1, "spur": 3})])
 
 
+def test_a_place_that_cannot_be_left_is_told_and_is_still_to_be_decided(page: Page, server: DecidingServer) -> None:
+    looking_at(page, "p1")
+    mark(page, "place-1-4").click()
+    looking_at(page, "place-1-4")
+    server.gone = {"perception": 5.0}
+    expect(page.locator("#review-leave")).to_be_disabled()
+    page.keyboard.press("r")
+    expect(page.locator(".toast")).to_contain_text("perception")
+    expect(mark(page, "place-1-4")).to_have_attribute("data-status", "decide")
+    assert server.posted == []
+
+
 def test_a_place_that_was_left_is_to_be_decided_again_when_another_matter_comes_up_there(
     page: Page, server: DecidingServer
 ) -> None:
@@ -388,6 +401,9 @@ def test_a_place_that_was_left_is_to_be_decided_again_when_another_matter_comes_
     mark(page, "place-1-4").click()
     looking_at(page, "place-1-4")
     page.keyboard.press("r")
+    expect(mark(page, "place-1-4")).to_have_attribute("data-status", "left")
+    # On another device, or after a reload, it is left too.
+    page.reload()
     expect(mark(page, "place-1-4")).to_have_attribute("data-status", "left")
     server.undecided_sites = (m.UndecidedSite(reasons.cane_crosses_cut(), "operator", 1, 4, WHERE),)
     server.tell(server.page_points())
@@ -438,7 +454,9 @@ def test_a_point_is_moved_by_millimetres_and_an_accepted_one_is_not(page: Page, 
         expect(page.locator("rp-adjust")).to_contain_text(words)
     mark(page, "p2").click()
     looking_at(page, "p2")
-    expect(page.get_by_role("button", name="+1")).to_have_attribute("title", text_of(reasons.acceptance_stands("p2")))
+    expect(page.get_by_role("button", name="+1")).to_have_attribute(
+        "title", text_of(reasons.acceptance_stands("Vine 1, spur 1"))
+    )
     expect(page.locator(".handle")).to_have_attribute("visibility", "hidden")
 
 

@@ -90,6 +90,22 @@ def test_every_screen_fits_every_window(page: Page, server: PlayedServer, subtes
                 fits(page, width, height)
 
 
+@pytest.mark.parametrize("language", ["de", "fr"])
+def test_every_screen_fits_in_languages_of_long_words(
+    page: Page, server: PlayedServer, subtests: pytest.Subtests, language: str
+) -> None:
+    page.evaluate("language => localStorage.setItem('setting.language', language)", language)
+    page.reload()
+    expect(page.locator("html")).to_have_attribute("lang", language)
+    working(page, server)
+    for name in ("work", "review", "drive", "report", "engineer"):
+        open_screen(page, name)
+        for width, height in ((1440, 900), (1024, 768), (390, 844)):
+            page.set_viewport_size({"width": width, "height": height})
+            with subtests.test(screen=name, size=f"{width}x{height}"):
+                fits(page, width, height)
+
+
 def test_the_view_has_most_of_the_window_and_no_banner_takes_any_of_it(
     page: Page, server: PlayedServer, subtests: pytest.Subtests
 ) -> None:

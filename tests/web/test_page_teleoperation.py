@@ -62,13 +62,13 @@ def middle(page: Page, selector: str) -> tuple[float, float]:
 def test_what_moves_and_along_which_axes_is_chosen(page: Page, server: PlayedServer) -> None:
     expect(page.get_by_role("group", name="What moves")).to_be_hidden()
     page.locator("#teleop").click()
-    page.get_by_role("button", name="world", exact=True).click()
+    page.get_by_role("button", name="row", exact=True).click()
     until(page, lambda: p.ShowGizmo(visible=True, axes="world") in server.said)
     page.get_by_role("button", name="Base", exact=True).click()
     until(page, lambda: p.ShowGizmo(visible=False, axes="world") in server.said)
     expect(page.locator("#hold")).to_be_hidden()
     page.get_by_role("group", name="What moves").get_by_role("button", name="Tool", exact=True).click()
-    expect(page.get_by_role("button", name="world", exact=True)).to_have_attribute("aria-pressed", "true")
+    expect(page.get_by_role("button", name="row", exact=True)).to_have_attribute("aria-pressed", "true")
     until(page, lambda: server.said.count(p.ShowGizmo(visible=True, axes="world")) == 2)
 
 
@@ -234,7 +234,7 @@ def test_in_a_mode_without_teleoperation_every_button_says_why(page: Page, serve
 
 def test_an_arrow_moves_the_tool_along_its_axis_while_it_is_held(page: Page, server: PlayedServer) -> None:
     page.locator("#teleop").click()
-    page.get_by_role("button", name="world", exact=True).click()
+    page.get_by_role("button", name="row", exact=True).click()
     up = page.locator('.arrows button[data-axis="z"][data-kind="move"][data-way="1"]')
     expect(up).to_have_attribute("aria-label", "Move the tool forth: Up")
     up.hover()

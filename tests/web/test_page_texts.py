@@ -28,6 +28,7 @@ from rolling_panda.messages import types
 from rolling_panda.mode_table import Event, Who
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.resources import resource
+from rolling_panda.topics import PLANT
 from tests.support.played_page import until
 from tests.support.played_server import PlayedServer
 
@@ -71,7 +72,7 @@ FAMILIES: dict[str, Sequence[str]] = {
     "stop.${}": ("idle", "sending", "sent", "failed"),
     "camera.${}": get_args(types.BridgeKind),
     "camera.${}.hint": get_args(types.BridgeKind),
-    "command.${}": (*(command.name for command in COMMANDS), HOLD),
+    "command.${}": (*(command.name for command in COMMANDS), *(each.__name__ for each in PLANT.requests), HOLD),
     "command.${}.hint": BUTTONS,
     "teleop.how.${}": ("tool", "base", "joints", "postures"),
     "telemetry.${}": ("low", "high", ""),

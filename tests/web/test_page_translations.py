@@ -41,6 +41,11 @@ def test_nothing_is_left_in_english(language: str) -> None:
     assert [key for key in sorted(long) if kept[key] == english.get(key)] == []
 
 
+@pytest.mark.parametrize(("language", "wrong"), [("it", r"\w'\w"), ("fr", r"\w'\w| [:;?!]")])
+def test_apostrophes_and_spaces_are_those_of_the_language(language: str, wrong: str) -> None:
+    assert {key: text for key, text in texts(language).items() if re.search(wrong, text)} == {}
+
+
 @pytest.mark.browser
 @pytest.mark.parametrize("language", OTHERS)
 def test_each_counted_text_has_the_plural_forms_that_browsers_ask_for(page: Page, language: str) -> None:
@@ -91,6 +96,12 @@ def test_numbers_and_reasons_are_in_the_language_of_the_browser(browser: Browser
     values = [["age_s", 0.5], ["limit_s", 0.25]]
     told = page.evaluate(shown, {"code": "joints_stale", "values": values})
     assert told == "Die Gelenkzustände sind 0,50 s alt; die Grenze ist 0,25 s"
+    for others, words in ((1, "mit 1 weiteren Rute ab"), (2, "mit 2 weiteren Ruten ab")):
+        assert words in page.evaluate(shown, {"code": "renewal_cut", "values": [["others", others]]})
+    (row,) = server.points[2:]
+    for code in ("point_unseen", "revised"):
+        told = page.evaluate(shown, {"code": code, "values": [["point", row.point.point_id]]})
+        assert "Stock 1, Zapfen 2" in told
     context.close()
 
 

@@ -135,7 +135,8 @@ function labelOf(step) {
 
 function howLong() {
   const seconds = timeLeft();
-  return seconds ? ` · ~${durationWords(seconds)}` : "";
+  // On one line.
+  return seconds ? ` · ~${durationWords(seconds)}`.replace(/(?!^) /g, "\u00a0") : "";
 }
 
 function distanceChoice() {

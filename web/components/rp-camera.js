@@ -89,7 +89,7 @@ class CameraMarks {
     }
     sign?.setAttribute("d", SIGNS[entry.state]);
     sign?.setAttribute("transform", `scale(${unit})`);
-    if (title) setText(title, `${point.point_id}: ${labelOf(entry.state)}`);
+    if (title) setText(title, text("review.mark", { vine: point.vine, spur: point.spur, status: labelOf(entry.state) }));
   }
 }
 

@@ -161,5 +161,5 @@ function choice(name, chosen, choose, values) {
     drawOn([chosen], () => button.setAttribute("aria-pressed", String(chosen.get() === value)));
     return button;
   });
-  return element("div", { class: "choice", attributes: { role: "group", "aria-label": text(`teleop.${name}`) } }, ...buttons);
+  return element("div", { class: "choice", data: { choices: name }, attributes: { role: "group", "aria-label": text(`teleop.${name}`) } }, ...buttons);
 }

@@ -1,10 +1,10 @@
-// The screen for engineers: panels that are moved, hidden and shown by buttons.
+// The screen for engineers: panels that are moved by buttons or dragged by their titles, hidden and shown.
 
 import { fetchJson } from "../js/link/api.js";
 import { PROCESSES } from "../js/link/messages.js";
 import { ageWords, dateWords, significant, spanWords } from "../js/state/format.js";
 import { isLive, isOpening, link, now, pageState, points, preview, processAge } from "../js/state/page-state.js";
-import { PANELS, arrangement, movePanel, resetPanels, showPanel } from "../js/state/panels.js";
+import { PANELS, arrangement, movePanel, placePanel, resetPanels, showPanel } from "../js/state/panels.js";
 import { partsOf, reasonText, severityOf } from "../js/state/reasons.js";
 import { screen } from "../js/state/screens.js";
 import { drawOn, signal } from "../js/state/signals.js";
@@ -34,6 +34,8 @@ class RpEngineer extends HTMLElement {
   /** @type {Map<PanelName, HTMLElement>} */
   panels = new Map();
   hiddenOnes = element("div", { class: "hidden-panels" });
+  /** What is dragged. @type {PanelName|null} */
+  dragged = null;
 
   connectedCallback() {
     const reset = element("button", { id: "reset-panels", class: "quiet", text: text("panels.reset"), onclick: () => this.reset() });
@@ -88,7 +90,42 @@ class RpEngineer extends HTMLElement {
       tool("hide", "gone", () => this.hide(name)),
     );
     const head = element("div", { class: "panel-head" }, element("h2", { text: title }), ...own, arranging);
-    return element("section", { class: "panel", data: { panel: name }, attributes: { "aria-label": title } }, head, ...content);
+    const panel = element("section", { class: "panel", data: { panel: name }, attributes: { "aria-label": title } }, head, ...content);
+    this.takeDrags(name, head, panel);
+    return panel;
+  }
+
+  /**
+   * A panel is dragged by its head, to the place of the one where it is dropped.
+   *
+   * @param {PanelName} name
+   * @param {HTMLElement} head
+   * @param {HTMLElement} panel
+   */
+  takeDrags(name, head, panel) {
+    head.draggable = true;
+    head.addEventListener("dragstart", (event) => {
+      this.dragged = name;
+      // Firefox drags nothing without data.
+      event.dataTransfer?.setData("text/plain", name);
+    });
+    head.addEventListener("dragend", () => {
+      this.dragged = null;
+    });
+    const mark = (/** @type {boolean} */ here) => panel.classList.toggle("target", here);
+    panel.addEventListener("dragover", (event) => {
+      if (this.dragged === null || this.dragged === name) return;
+      event.preventDefault();
+      mark(true);
+    });
+    panel.addEventListener("dragleave", () => mark(false));
+    panel.addEventListener("drop", (event) => {
+      mark(false);
+      if (this.dragged === null || this.dragged === name) return;
+      event.preventDefault();
+      placePanel(this.dragged, name);
+      this.arrange();
+    });
   }
 
   /**

@@ -12,8 +12,8 @@ class RpMode extends HTMLElement {
     this.setAttribute("role", "status");
     this.setAttribute("aria-label", text("mode.label"));
     const shape = element("span", { class: "shape" });
-    const word = element("span", { class: "word" });
-    const chip = element("span", { id: "mode", class: "chip mode", data: { mode: "" } }, shape, word);
+    const [word, phase] = [element("span"), element("span", { class: "phase" })];
+    const chip = element("span", { id: "mode", class: "chip mode", data: { mode: "" } }, shape, element("span", { class: "word" }, word, phase));
     this.append(chip);
     drawOn([pageState, link, now], () => {
       const controller = pageState.get()?.controller ?? null;
@@ -21,8 +21,9 @@ class RpMode extends HTMLElement {
       chip.dataset.mode = mode;
       chip.classList.toggle("stale", !isLive("controller"));
       setIcon(shape, mode || "UNKNOWN");
-      const phase = controller?.phase ? ` · ${text(`phase.${controller.phase}`)}` : "";
-      setText(word, text(`mode.${mode || "none"}`) + phase);
+      setText(word, text(`mode.${mode || "none"}`));
+      const words = controller?.phase ? ` · ${text(`phase.${controller.phase}`)}` : "";
+      setText(phase, words);
       setAttribute(chip, "title", reasonText(controller?.reason));
     });
   }

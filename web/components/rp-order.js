@@ -3,6 +3,7 @@
 import { cutTime, moveTo, orderWords, resetOrder, whyNoMove, whyNoResetOrder, workOrder } from "../js/control/order.js";
 import { select, selectAndReveal } from "../js/control/selection.js";
 import { link, now, pageState, points, revealCount, selected } from "../js/state/page-state.js";
+import { pointNames } from "../js/state/point-names.js";
 import { drawOn } from "../js/state/signals.js";
 import { text } from "../js/state/texts.js";
 import { element, setAttribute, setEnabled, setText } from "../js/views/dom.js";
@@ -11,7 +12,7 @@ import { reasonText } from "../js/state/reasons.js";
 /** @typedef {import("../js/link/messages.js").PagePoint} PagePoint */
 
 /** Height of a row (px), as in rule.css. */
-const ROW = 44;
+const ROW = 48;
 /** Extra rows above and below the view. */
 const SPARE = 4;
 /** A drag within EDGE of an end scrolls the list by SCROLL for each move (px). */
@@ -134,7 +135,7 @@ class RpOrder extends HTMLElement {
     const [, number, name, way] = row.children;
     const why = reasonText(point.entry.reason);
     if (number) setText(number, `${at + 1}`);
-    if (name) setText(name, text("order.row", { point: point.point.point_id, vine: point.point.vine, spur: point.point.spur }));
+    if (name) setText(name, text("work.place", { vine: point.point.vine, spur: point.point.spur }));
     if (way) setText(way, point.plan ? cutTime(point.plan) : "");
     setAttribute(row, "data-point-id", point.point.point_id);
     setAttribute(row, "title", why || reasonText(point.point.reason));
@@ -182,7 +183,7 @@ class RpOrder extends HTMLElement {
    * @param {number} to
    */
   async move(pointId, to) {
-    if ((await moveTo(pointId, to)) && this.said) setText(this.said, text("order.moved", { point: pointId, number: to + 1 }));
+    if ((await moveTo(pointId, to)) && this.said) setText(this.said, text("order.moved", { point: pointNames(pointId), number: to + 1 }));
   }
 
   /** @param {PointerEvent} event */

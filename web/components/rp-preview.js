@@ -20,10 +20,11 @@ import {
 } from "../js/control/preview.js";
 import { decimal } from "../js/state/format.js";
 import { link, now, pageState, points, preview, selected } from "../js/state/page-state.js";
+import { pointNames } from "../js/state/point-names.js";
 import { drawOn } from "../js/state/signals.js";
 import { counted, labelOf, text } from "../js/state/texts.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
-import { reason, reasonText } from "../js/state/reasons.js";
+import { capital, reason, reasonText } from "../js/state/reasons.js";
 
 /** @typedef {import("../js/link/messages.js").PreviewState} PreviewState */
 
@@ -121,7 +122,7 @@ function wordsOf(state, at) {
   const approved = state.phase === "approved" ? `${text("preview.approved", { user: state.approved_by })} ` : "";
   if (cut) {
     const end = cut.reason ? text("preview.not_cut", { why: reasonText(cut.reason) }) : text("preview.cut");
-    return `${approved}${cut.point_id}: ${end} · ${least([cut])}`;
+    return `${approved}${capital(pointNames(cut.point_id))}: ${end} · ${least([cut])}`;
   }
   const seconds = decimal(state.duration_s, 1);
   const done = state.cuts.filter((each) => each.cut_s !== null).length;

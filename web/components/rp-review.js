@@ -305,13 +305,9 @@ class RpReview extends HTMLElement {
     const item = this.item;
     if (!item || this.isTooSoon()) return;
     const { row } = item;
-    const why = this.whyNotNow() ?? (row ? whyNotReject(row) : null);
+    const why = this.whyNotNow() ?? (row ? whyNotReject(row) : whyNoPlacing());
     if (why) return showToast("info", reasonText(why));
-    if (row === null) {
-      leavePlace(item);
-      this.goOn(item);
-      return;
-    }
+    if (row === null) return this.decide(item, leavePlace(item));
     const asked = !isUnknown(row);
     await this.decide(item, reject(row, ""), asked ? row : null);
   }

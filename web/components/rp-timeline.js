@@ -18,6 +18,8 @@ const AGAIN_MS = 5000;
 /** Width of a mark, and of a tick's time (px). */
 const MARK_PX = 30;
 const TICK_PX = 90;
+/** Width of a letter of a mode's name (px). */
+const LETTER_PX = 9.5;
 /** Events of a mark whose words are shown. */
 const MOST_WORDS = 4;
 /** From the least to the most severe. */
@@ -68,7 +70,7 @@ export class RpTimeline extends HTMLElement {
     /** @param {number} at */
     const place = (at) => `${((100 * (at - told.began_at)) / span).toFixed(3)}%`;
     const bands = modeSpans(told, now).map((each) => {
-      const wide = ((each.to - each.from) / span) * width > 64;
+      const wide = ((each.to - each.from) / span) * width > 12 + LETTER_PX * labelOf(each.mode).length;
       const band = element("span", { class: "time-mode", text: wide ? labelOf(each.mode) : "", data: { mode: each.mode } });
       band.style.setProperty("left", place(each.from));
       band.style.setProperty("width", place(told.began_at + each.to - each.from));

@@ -3,6 +3,7 @@
 import { ask } from "../link/api.js";
 import { SURE } from "../link/messages.js";
 import { points, say } from "../state/page-state.js";
+import { pointNames } from "../state/point-names.js";
 import { signal } from "../state/signals.js";
 import { counted, text } from "../state/texts.js";
 import { whyNot, whyNotPoint, whyNothingOf } from "./allowed.js";
@@ -143,7 +144,7 @@ export async function move(row, millimetres) {
  * @param {boolean} wrong
  */
 export function judge(point, wrong) {
-  const what = text(wrong ? "decision.calling_wrong" : "decision.calling_right", { point });
+  const what = text(wrong ? "decision.calling_wrong" : "decision.calling_right", { point: pointNames(point) });
   return ask(what, `api/points/${encodeURIComponent(point)}/judge`, { wrong });
 }
 

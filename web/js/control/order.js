@@ -3,6 +3,7 @@
 import { ask } from "../link/api.js";
 import { decimal, durationWords } from "../state/format.js";
 import { pageState, points } from "../state/page-state.js";
+import { pointNames } from "../state/point-names.js";
 import { counted, text } from "../state/texts.js";
 import { countOf, whyNot, whyNotPoint } from "./allowed.js";
 import { nameOf, pushUndo } from "./decisions.js";
@@ -57,7 +58,7 @@ export async function moveTo(pointId, to) {
   const rest = workOrder().filter((row) => row.point.point_id !== pointId);
   const before = rest[to]?.point.point_id ?? "";
   const revision = pageState.get()?.controller?.order.revision ?? 0;
-  return ask(text("decision.moving", { point: pointId }), `api/points/${encodeURIComponent(pointId)}/work-before`, { before, revision });
+  return ask(text("decision.moving", { point: pointNames(pointId) }), `api/points/${encodeURIComponent(pointId)}/work-before`, { before, revision });
 }
 
 export async function resetOrder() {

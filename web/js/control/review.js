@@ -1,5 +1,6 @@
 // The sequence in which a person decides: the points and the undecided places along the row, one at a time.
 
+import { ask } from "../link/api.js";
 import { points, selected } from "../state/page-state.js";
 import { statusOf } from "../state/point-status.js";
 import { signal } from "../state/signals.js";
@@ -21,8 +22,6 @@ const SENT_MS = 4000;
 
 /** The item that is looked at; empty before the first. */
 export const current = signal("");
-/** Places that a person of this page has left as they are, by key, with what they left. */
-const left = signal(/** @type {ReadonlyMap<string, string>} */ (new Map()));
 /** Grows with every change of what is decided here and not yet told by the robot. */
 export const changes = signal(0);
 /** Decisions under way, by key: when they were sent, and about which state. @type {Map<string, { at: number, state: string }>} */
@@ -35,15 +34,14 @@ export function keyOfPoint(row) {
 
 /** @type {readonly Item[]} */
 let built = [];
-/** @type {readonly unknown[]} */
-let builtFrom = [];
+/** @type {unknown} */
+let builtFrom = null;
 
 /** All points and places, in the order of the row. @returns {readonly Item[]} */
 export function items() {
   const page = points.get();
-  const from = [page, left.get()];
-  if (from.every((each, k) => each === builtFrom[k])) return built;
-  builtFrom = from;
+  if (page === builtFrom) return built;
+  builtFrom = page;
   built = [...(page?.points ?? []).map(ofPoint), ...places(page?.undecided_sites ?? [])].sort(
     (a, b) => a.vine - b.vine || a.spur - b.spur || Number(a.row === null) - Number(b.row === null),
   );
@@ -73,14 +71,9 @@ function places(sites) {
   }
   return [...bySpur].map(([key, all]) => {
     const { vine, spur } = /** @type {UndecidedSite} */ (all[0]);
-    const status = left.get().get(key) === whatOf(all) ? "left" : "decide";
+    const status = all.every((site) => site.needs === "nothing") ? "left" : "decide";
     return { key, vine, spur, status, row: null, sites: all };
   });
-}
-
-/** What a place is about: where it becomes another matter, it is to be decided anew. @param {readonly UndecidedSite[]} sites */
-function whatOf(sites) {
-  return sites.map((site) => site.reason.code).join();
 }
 
 /** @param {string} key */
@@ -96,7 +89,7 @@ export function isOpen(item) {
 
 /** Places that another look of the camera may settle come last. @param {Item} item */
 function canWait(item) {
-  return item.sites.length > 0 && item.sites.every((site) => site.needs === "another look");
+  return item.sites.length > 0 && item.sites.every((site) => site.needs !== "operator");
 }
 
 /**
@@ -140,7 +133,7 @@ export function step(step) {
  * @param {Promise<boolean>} done Was it accepted?
  */
 export async function whileSent(key, done) {
-  sent.set(key, { at: performance.now(), state: itemOf(key)?.row?.entry.state ?? "" });
+  sent.set(key, { at: performance.now(), state: stateOf(key) });
   changes.set(changes.get() + 1);
   const ok = await done;
   if (!ok) sent.delete(key);
@@ -153,28 +146,23 @@ export function isSent(key) {
   const decision = sent.get(key);
   if (!decision) return false;
   // Told by the robot, or waited for long enough.
-  const told = itemOf(key)?.row?.entry.state !== decision.state;
+  const told = stateOf(key) !== decision.state;
   if (told || performance.now() - decision.at > SENT_MS) sent.delete(key);
   return sent.has(key);
 }
 
-/** Leave a place as it is: nothing is cut there anyway. @param {Item} item */
-export function leavePlace(item) {
-  remember(item.key, whatOf(item.sites));
-  const back = async () => {
-    remember(item.key, "");
-    return true;
-  };
-  pushUndo(text("review.undo_place", { vine: item.vine, spur: item.spur }), back, item.key);
+/** What is decided about an item. @param {string} key */
+function stateOf(key) {
+  const item = itemOf(key);
+  return item?.row?.entry.state ?? item?.status ?? "";
 }
 
-/**
- * @param {string} key
- * @param {string} what What was left there; empty where it is to be decided again.
- */
-function remember(key, what) {
-  left.set(new Map(left.get()).set(key, what));
-  changes.set(changes.get() + 1);
+/** Leave a place as it is: nothing is cut there. @param {Item} item */
+export async function leavePlace({ key, vine, spur }) {
+  const leave = (/** @type {boolean} */ left) => ask(text("command.LeaveSite"), "api/sites/leave", { vine, spur, left });
+  const done = await leave(true);
+  if (done) pushUndo(text("review.undo_place", { vine, spur }), () => leave(false), key);
+  return done;
 }
 
 // A point that is chosen anywhere is looked at. The work does not take a picture away under a press.

@@ -19,7 +19,7 @@ export type Covariance = [number, number, number, number, number, number];
 
 export type CutKind = "spur cut"|"renewal cut"|"cane cut"|"by hand";
 
-export type Need = "another look"|"operator";
+export type Need = "another look"|"operator"|"nothing";
 
 export type QuatXyzw = [number, number, number, number];
 
@@ -504,7 +504,7 @@ export interface PagePoint {
 export interface UndecidedSite {
   /** Reason. */
   reason: Reason;
-  /** Another look by the camera, or a decision by the operator. */
+  /** Another look by the camera, or a decision by the operator; nothing where one has left it as it is. */
   needs: Need;
   /** Number of the vine; 0 for no particular spur. */
   vine: number;

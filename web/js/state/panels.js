@@ -57,6 +57,19 @@ export function movePanel(name, way) {
 }
 
 /**
+ * Move a panel to the place of another one.
+ *
+ * @param {PanelName} name
+ * @param {PanelName} other
+ */
+export function placePanel(name, other) {
+  const { order, hidden } = arrangement.get();
+  const rest = order.filter((each) => each !== name);
+  rest.splice(order.indexOf(other), 0, name);
+  arrange({ order: rest, hidden });
+}
+
+/**
  * @param {PanelName} name
  * @param {boolean} show
  */

@@ -1,9 +1,13 @@
 // Reasons as text for people.
 
 import { decimal, significant } from "./format.js";
-import { REASONS, labelOf, text } from "./texts.js";
+import { pointNames } from "./point-names.js";
+import { REASONS, isOne, labelOf, text } from "./texts.js";
 
 /** @typedef {{code: string, values: readonly (readonly [string, string|number|Reason])[]}} Reason */
+
+/** Values that are ids of points. */
+const OF_POINTS = Object.freeze(["point", "points", "before", "other"]);
 
 /**
  * A reason of the page's own.
@@ -46,7 +50,12 @@ export function partsOf({ code, values = [] }) {
   if (!entry) return { text: [code, ...values.map(([name, value]) => `${name} ${shown(value, "")}`)].join(", "), act: "" };
   const [, template, act] = entry;
   const known = new Map(values);
-  const told = template.replace(/\{(\w+)(?::([^}]*))?\}/g, (_, name, format) => shown(known.get(name), format ?? ""));
+  const told = template.replace(/\{(\w+)(?::([^}]*))?\}/g, (_, name, format, at) => {
+    const value = known.get(name);
+    const place = typeof value === "string" && OF_POINTS.includes(name) ? pointNames(value) : value;
+    if (place === value) return shown(value, format ?? "");
+    return at === 0 ? capital(String(place)) : String(place);
+  });
   return { text: told, act };
 }
 
@@ -64,7 +73,12 @@ export function reasonText(reason) {
 
 /** @param {string} words */
 export function sentence(words) {
-  return `${words.charAt(0).toUpperCase()}${words.slice(1)}.`;
+  return `${capital(words)}.`;
+}
+
+/** @param {string} words */
+export function capital(words) {
+  return `${words.charAt(0).toUpperCase()}${words.slice(1)}`;
 }
 
 /**
@@ -78,13 +92,15 @@ export function saidText(reason) {
 
 /**
  * @param {string|number|Reason|undefined} value
- * @param {string} format As in Python: `.1f`, `g` or empty.
+ * @param {string} format As in Python: `.1f`, `g` or empty; or words for one and for several, as `cane|canes`.
  * @returns {string}
  */
 function shown(value, format) {
   if (value === undefined) return "?";
   if (typeof value === "string") return labelOf(value);
   if (typeof value === "object") return reasonText(value);
+  const words = format.split("|");
+  if (words.length > 1) return words[isOne(value) ? 0 : 1] ?? "";
   const digits = /^\.(\d)f$/.exec(format);
   return digits ? decimal(value, Number(digits[1])) : significant(value, format === "g" ? 6 : 12);
 }

@@ -56,6 +56,15 @@ export function counted(key, count, values = {}) {
   return text(`${key}.${PLURALS.select(count)}`, { ...values, count });
 }
 
+/**
+ * Does a number take the singular?
+ *
+ * @param {number} count
+ */
+export function isOne(count) {
+  return PLURALS.select(count) === "one";
+}
+
 /** What a name in a message may be of. */
 const FAMILIES = Object.freeze(["mode", "point", "command", "process", "role", "name"]);
 
