@@ -284,7 +284,7 @@ def test_an_invitation_is_shown_as_a_code_that_leads_to_its_link(page: Page, ser
     page.locator("#invite-make").click()
     code = page.locator(".qr")
     expect(code).to_have_attribute("aria-label", "QR code of the link for Bob")
-    expect(page.locator(".invite-code")).to_contain_text("operator: moves the robot")
+    expect(page.locator("#invitation")).to_contain_text("operator: moves the robot")
     drawn = code.locator("path").get_attribute("d") or ""
     quiet = 4
     dark = {(x + quiet, y + quiet) for y, row in enumerate(rows) for x, module in enumerate(row) if module == "1"}

@@ -135,8 +135,8 @@ function labelOf(step) {
 
 function howLong() {
   const seconds = timeLeft();
-  // On one line.
-  return seconds ? ` · ~${durationWords(seconds)}`.replace(/(?!^) /g, "\u00a0") : "";
+  // A line may end after the dot alone.
+  return seconds ? `\u00a0· ${`~${durationWords(seconds)}`.replaceAll(" ", "\u00a0")}` : "";
 }
 
 function distanceChoice() {

@@ -35,7 +35,11 @@ class RpInvite extends HTMLElement {
         autocomplete: "off",
       },
     });
-    const role = dropDown({ id: "invite-role" }, ROLES.map((each) => [each, text(`invite.role.${each}`)]));
+    const role = dropDown({ id: "invite-role" }, ROLES.map((each) => [each, labelOf(each)]));
+    const may = element("p", { class: "hint", attributes: { role: "status" } });
+    const tell = () => setText(may, text(`invite.role.${role.value}`));
+    role.addEventListener("change", tell);
+    tell();
     const words = element("p", { class: "hint", attributes: { role: "status" } });
     const link = element("input", {
       id: "invite-link",
@@ -51,6 +55,7 @@ class RpInvite extends HTMLElement {
       user,
       element("label", { text: text("invite.role"), attributes: { for: "invite-role" } }),
       role,
+      may,
       element("button", { id: "invite-make", class: "primary", text: text("invite.make"), attributes: { type: "submit" } }),
       words,
       made,
@@ -89,8 +94,7 @@ class RpInvite extends HTMLElement {
       const name = user.value.trim();
       const local = LOCAL.includes(location.hostname) ? ` ${text("invite.local")}` : "";
       setText(words, text("invite.made", { user: name, role: labelOf(role.value) }) + local);
-      const what = element("p", { text: text(`invite.role.${role.value}`) });
-      code.replaceChildren(qrCode(answer.qr ?? [], text("invite.qr", { user: name })), what);
+      code.replaceChildren(qrCode(answer.qr ?? [], text("invite.qr", { user: name })));
       link.select();
     });
     copy.addEventListener("click", async () => {
@@ -103,9 +107,9 @@ class RpInvite extends HTMLElement {
       }
     });
     drawOn([pageState, serverLink], () => {
-      const may = pageState.get()?.role === "supervisor" && serverLink.get().status === "open";
-      if (this.hidden === may) this.hidden = !may;
-      if (!may && !form.hidden) show(false);
+      const invites = pageState.get()?.role === "supervisor" && serverLink.get().status === "open";
+      if (this.hidden === invites) this.hidden = !invites;
+      if (!invites && !form.hidden) show(false);
     });
   }
 }

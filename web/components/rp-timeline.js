@@ -78,7 +78,7 @@ export class RpTimeline extends HTMLElement {
     });
     this.modes.replaceChildren(...bands);
     // The time stands to the right of its tick.
-    const last = told.ended_at - (span * TICK_PX * 0.8) / width;
+    const last = told.ended_at - (span * TICK_PX) / width;
     const times = ticks(told.began_at, told.ended_at, Math.max(2, Math.floor(width / TICK_PX))).filter((at) => at < last);
     this.axis.replaceChildren(
       ...times.map((at) => {
