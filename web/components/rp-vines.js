@@ -28,7 +28,7 @@ function wordsOf(all) {
   const sum = (/** @type {"done"|"count"} */ name) => all.reduce((total, vine) => total + vine[name], 0);
   if (sum("count") === 0) return text("vines.none");
   const seconds = timeLeft();
-  const left = seconds ? ` · ${text("vines.left", { time: durationWords(seconds) })}` : "";
+  const left = seconds ? ` · ${text("vines.left", { time: durationWords(seconds).replaceAll(" ", "\u00a0") })}` : "";
   return text("vines.done", { done: sum("done"), count: sum("count") }) + left;
 }
 
