@@ -61,6 +61,21 @@ def test_the_wires_before_the_robot_are_all_there(seen):
     assert sum(math.dist(wire.start, wire.end) for wire in near) > 1.0
 
 
+@pytest.mark.parametrize("name", ["labels", "network"])
+def test_no_wire_goes_past_the_end_post(name):
+    segmenter = choose_segmenter(name)
+    model, row = RobotModel(), grow(VineyardConfig(), 0)
+    camera, known = Camera(CameraConfig(), 0), ObstacleMap(ObstacleConfig())
+    posts = [rod.start[0] for _, rod in row.standing() if rod.kind == "post"]
+    last, capsules = max(posts), ()
+    for x in (last - 0.8, last - 0.2, last + 0.3):
+        for number in range(2):
+            view = decode_frame(survey_frame(camera, row, model, number, x), model)
+            capsules = known.update(view, segmenter.segment(view))
+    ends = [max(capsule.start[0], capsule.end[0]) for capsule in capsules if capsule.kind == "wire"]
+    assert last - 0.3 < max(ends) < last + VineyardConfig().post_radius
+
+
 def elbow(angle):
     """The arm beside a cut, its fourth joint at this angle (7, rad)."""
     return (-0.046, -1.034, 0.504, angle, 1.96, 1.944, 0.392)
