@@ -3,7 +3,7 @@
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.support.page_parts import open_screen, show_mode, working
+from tests.support.page_parts import choose, held, open_screen, show_mode, working
 from tests.support.page_states import STATES
 from tests.support.played_page import box_of
 from tests.support.played_server import PlayedServer, controller, point
@@ -146,6 +146,26 @@ def test_the_words_of_a_banner_have_room_on_every_screen(
         page.set_viewport_size({"width": width, "height": height})
         with subtests.test(size=f"{width}x{height}"):
             assert box_of(words)["width"] >= 150
+
+
+def test_a_banner_covers_no_decision_beside_the_picture(
+    page: Page, server: PlayedServer, subtests: pytest.Subtests
+) -> None:
+    working(page, server)
+    choose(page, "p3")
+    server.control = held("other", "Bob")
+    show_mode(page, server, controller("PAUSED", reason="nobody has looked at the robot for 2.0 s, and there is " * 3))
+    expect(page.locator("rp-alarms li:visible")).to_have_count(1)
+    for width, height in SIZES:
+        if width < height:
+            continue
+        page.set_viewport_size({"width": width, "height": height})
+        with subtests.test(size=f"{width}x{height}"):
+            covered = """all => all.filter(each => {
+              const { left, top, width, height } = each.getBoundingClientRect();
+              return document.elementFromPoint(left + width / 2, top + height / 2)?.closest(".notices");
+            }).map(each => each.id || each.textContent)"""
+            assert page.locator("#review-accept, #review-leave, .review-head button").evaluate_all(covered) == []
 
 
 @pytest.mark.parametrize("name", ["review", "drive", "report", "engineer"])
