@@ -22,7 +22,7 @@ from perception.skeleton.topology import perceive_plant
 from perception.tracking.camera_rays import CameraRays
 from rolling_panda import messages as m
 from rolling_panda import reasons
-from rolling_panda.commands import AddPoint, AddPointInImage, EvaluateRule, MovePoint, SetRule, UndoRule
+from rolling_panda.commands import AddPoint, AddPointInImage, EvaluateRule, LeaveSite, MovePoint, SetRule, UndoRule
 from rolling_panda.messages.perception import SpurPicture, point_digest
 from rolling_panda.messages.types import WOOD_CLASSES
 from rolling_panda.model.robot import RobotModel
@@ -182,6 +182,24 @@ def test_what_cannot_be_a_post_is_told_with_its_count(model, frames):
         seen.process(msgspec.structs.replace(frame, labels_zlib=zlib.compress(labels.tobytes())))
     (lying,) = (reason for reason in seen.rejected_wood if reason.code == "wood_lying")
     assert dict(lying.values)["kind"] == "post" and dict(lying.values)["count"] >= 1.0
+
+
+def test_a_place_that_an_operator_leaves_needs_nothing_until_that_is_taken_back(model, frames):
+    seen, _ = shown(model, frames)
+    places = [site for site in seen.points().undecided_sites if site.vine > 0]
+    assert places, "the pictures show something that is undecided"
+    vine, spur = places[0].vine, places[0].spur
+
+    def needs():
+        return {site.needs for site in seen.points().undecided_sites if (site.vine, site.spur) == (vine, spur)}
+
+    before = needs()
+    answer = seen.answer(LeaveSite(user="Ada", vine=vine, spur=spur))
+    assert (answer.ok, answer.reason) == (True, reasons.site_left(vine, spur)) and needs() == {"nothing"}
+    answer = seen.answer(LeaveSite(user="Ada", vine=vine, spur=spur, left=False))
+    assert (answer.ok, answer.reason) == (True, reasons.site_reopened(vine, spur)) and needs() == before
+    answer = seen.answer(LeaveSite(user="Ada", vine=99, spur=1))
+    assert (answer.ok, answer.reason) == (False, reasons.site_unknown(99, 1))
 
 
 def test_an_empty_view_gives_no_points(model, frames):
