@@ -47,7 +47,7 @@ from rolling_panda.bounds import wider
 from rolling_panda.commands import COMMAND_OF, Condition, Handlers
 from rolling_panda.config import RobotConfig
 from rolling_panda.errors import ControlError
-from rolling_panda.messages.perception import CloseUpRequest, CloseUpResult, Obstacles
+from rolling_panda.messages.perception import CALIBRATION, CHECK, CloseUpRequest, CloseUpResult, Obstacles
 from rolling_panda.messages.supervision import StopRecord
 from rolling_panda.transport.inbox import Answered, Inbox, Rejected, Reply, Request
 
@@ -247,7 +247,8 @@ class Controller:
             intents.Start: self._start,
             intents.Survey: self._survey,
             intents.LookAgain: self._look_again,
-            intents.CalibrateCamera: lambda asked, now: self._begin(asked, now, self._movement.look_at_board),
+            intents.CalibrateCamera: functools.partial(self._look_around, CALIBRATION),
+            intents.CheckCamera: functools.partial(self._look_around, CHECK),
             intents.Pause: self._pause,
             intents.Home: self._home,
             intents.Reset: lambda asked, now: self._supervisor.stops.ask_release(asked, self._supervisor.bridge, now),
@@ -344,6 +345,9 @@ class Controller:
         if place is None:
             return reasons.site_unknown(asked.vine, asked.spur)
         return self._begin(asked, now, functools.partial(self._movement.sequence.survey, place=place))
+
+    def _look_around(self, prefix: str, asked: intents.Start, now: float) -> m.Reason | None:
+        return self._begin(asked, now, functools.partial(self._movement.look_around, prefix))
 
     def _begin(self, asked: intents.Start, now: float, work: Callable[[], None]) -> m.Reason | None:
         refused = self._change_mode(asked, now)

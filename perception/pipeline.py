@@ -43,7 +43,7 @@ from rolling_panda.commands import (
     UndoRule,
     UseCamera,
 )
-from rolling_panda.messages.perception import CALIBRATION, CameraMount, Capsule, CloseUpResult, SpurPicture
+from rolling_panda.messages.perception import CALIBRATION, CHECK, CameraMount, Capsule, CloseUpResult, SpurPicture
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.model.wire_values import vector3
@@ -168,7 +168,7 @@ class Perception:
         self._unfamiliar_frames = 0
         cylinders = self._obstacle_map.update(view, labels)
         if self._is_survey(view, labels):
-            self._survey(view, labels, cylinders)
+            self._survey(view, labels, cylinders, np.array([frame.base.x, frame.base.y, frame.base.phi]))
         else:
             # Too near or too far to read whole spurs, but it may show that wood is gone.
             self._apply(self._tracker.update(view, labels, []))
@@ -190,9 +190,10 @@ class Perception:
         self._site_messages = (undecided_site(reason),)
         return replace(self.points(), canes=())
 
-    def _survey(self, view: View, labels: Labels, cylinders: tuple[Capsule, ...]) -> None:
-        """Update plant map, points and obstacles from a survey frame."""
+    def _survey(self, view: View, labels: Labels, cylinders: tuple[Capsule, ...], base: Array) -> None:
+        """Update plant map, points and obstacles from a survey frame, taken with the base at a pose (3, odom)."""
         plant = perceive_plant(view, labels, self._config.skeleton)
+        self.camera.observe(view, base, [cane.axis for spur in plant.spurs for cane in spur.canes])
         numbers = self._numbering.number(plant, view.R[:, 0])
         spurs = self.plant_map.update(plant, numbers)
         self._spur_pictures.add(view, plant, numbers)
@@ -221,6 +222,14 @@ class Perception:
         """
         if frame.point_id.startswith(CALIBRATION):
             return self.camera.look(frame)
+        if frame.point_id.startswith(CHECK):
+            # The picture itself tells, as one of a survey.
+            return CloseUpResult(
+                header=m.Header(frame.header.stamp, "odom"),
+                point_id=frame.point_id,
+                number=frame.number,
+                finding="seen",
+            )
         point = self._tracker.find(frame.point_id)
         if point is None:
             return failed_check(frame, reasons.point_unknown_to_perception())

@@ -366,6 +366,10 @@ class CalibrateCamera(Start, frozen=True, kw_only=True):
     """READY → AUTO. Look at the calibration's board from all around; the base stands still. It cuts nothing."""
 
 
+class CheckCamera(Start, frozen=True, kw_only=True):
+    """READY → AUTO. Look at the row from a few places, to check the camera's calibration. The base stands still."""
+
+
 class Pause(Intent, frozen=True, kw_only=True):
     """AUTO or TELEOP → PAUSED."""
 
@@ -564,6 +568,7 @@ COMMANDS: Final[tuple[Command, ...]] = (
     Command(Survey, "mode", "/survey", control=True, event=Event.START, conditions=_WATCHED_MOTION),
     Command(LookAgain, "mode", "/look-again", control=True, event=Event.START, conditions=_WATCHED_MOTION),
     Command(CalibrateCamera, "mode", "/camera/calibrate", control=True, event=Event.START, conditions=_WATCHED_MOTION),
+    Command(CheckCamera, "mode", "/camera/check", control=True, event=Event.START, conditions=_WATCHED_MOTION),
     Command(Pause, "mode", "/pause", event=Event.PAUSE),
     Command(Resume, "mode", "/resume", control=True, event=Event.RESUME),
     Command(

@@ -2433,6 +2433,11 @@ def board_unseen(places: float) -> None:
 
 
 @_reason("info", "")
+def row_looked_at(seen: float, places: float) -> None:
+    """The camera has looked at the row from {seen:.0f} of {places:.0f} places."""
+
+
+@_reason("info", "")
 def board_not_in_picture() -> None:
     """The board is not in this picture, or too little of it."""
 

@@ -1,11 +1,12 @@
-"""The postures from which the camera looks at the calibration's board, and the work that takes the pictures.
+"""Postures from which the camera looks at the calibration's board, or at the row, and the work that takes the pictures.
 
-The board stands about `BOARD_AHEAD` before the camera in the survey posture. Where exactly is not known, and need not
-be: each picture is used that shows it. The base stands still. The tool stays `_CLEAR` away from the board's plane.
+The base stands still. What is looked at stands about where it should be before the camera in the survey posture. Where
+exactly is not known, and need not be: each picture is used that shows it.
 """
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,18 +19,11 @@ from controller.work.close_up import CloseUpClient
 from controller.work.homing import Homing
 from controller.work.step_result import StepResult
 from rolling_panda import reasons
-from rolling_panda.messages.perception import CALIBRATION
+from rolling_panda.messages.perception import CALIBRATION, CHECK
 from rolling_panda.messages.types import Reason
 from rolling_panda.model.differential_drive import NQ, Array
 from rolling_panda.model.robot import ARM_Q, RobotModel
 
-#: Distance of the board before the camera in the survey posture (m), and least distance of the tool from its plane (m).
-BOARD_AHEAD, _CLEAR = 0.45, 0.12
-#: Directions of view, and how far they are from square to the board (rad): its marks can still be read, and the views
-#: are turned enough to tell a turn about the optical axis.
-_DIRECTIONS, _TILT = 42, (math.radians(8.0), math.radians(48.0))
-#: Distances from the board (m), and turns about the optical axis (rad).
-_DISTANCES, _ROLLS = (0.42, 0.34, 0.54), tuple(math.radians(roll) for roll in (0.0, 35.0, -35.0, 60.0, -60.0))
 #: Angle between one direction and the next about the board's normal (rad), which spreads any number of them evenly.
 _GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
 #: Steps of the inverse kinematics, its damping, and the error that is left (m, rad).
@@ -39,35 +33,66 @@ _MARGIN = 0.1
 #: The arm rests for this time before a picture (s), and is in place within this angle (rad).
 _REST_S, _NEAR = 0.4, 0.01
 
+
+@dataclass(frozen=True)
+class Views:
+    """Views of one thing.
+
+    Attributes:
+        prefix: Of the names of the pictures.
+        ahead: Its distance before the camera in the survey posture (m).
+        count: Directions of view.
+        tilt: How far they are from square, the least and the most (degrees).
+        distances: Of the camera from it, in turn (m).
+        rolls: Turns about the optical axis, in turn (degrees).
+        clear: Least distance of the tool from its plane (m).
+    """
+
+    prefix: str
+    ahead: float
+    count: int
+    tilt: tuple[float, float]
+    distances: tuple[float, ...]
+    rolls: tuple[float, ...]
+    clear: float
+
+
+#: Of the board: its marks can still be read, and the views are turned enough to tell a turn about the optical axis.
+BOARD = Views(CALIBRATION, 0.45, 42, (8.0, 48.0), (0.42, 0.34, 0.54), (0.0, 35.0, -35.0, 60.0, -60.0), 0.12)
+#: Of the row: from so far away that whole spurs are seen, with the image upright.
+ROW = Views(CHECK, 0.75, 8, (8.0, 20.0), (0.85, 0.62, 0.75), (0.0, 12.0, -12.0), 0.24)
+
 Refusal = Callable[[Array, Array], Reason | None]
 
 
-def view_postures(robot: RobotModel, home: Array) -> tuple[Array, ...]:
-    """Postures of the arm (7, rad) with the camera on the board, in an order with short ways.
+def view_postures(robot: RobotModel, home: Array, views: Views = BOARD) -> tuple[Array, ...]:
+    """Postures of the arm (7, rad) with the camera on a thing, in an order with short ways.
 
     Args:
         robot: Its `data` is overwritten.
         home: Survey posture (7, rad).
+        views: What is looked at; views that the arm cannot reach are left out.
     """
     q = np.zeros(NQ)
     q[ARM_Q] = home
     ahead = robot.pose(q, robot.camera_id)
-    board = ahead.translation + BOARD_AHEAD * ahead.rotation[:, 2]
+    middle = ahead.translation + views.ahead * ahead.rotation[:, 2]
+    least, most = views.tilt
     found = []
-    for index in range(_DIRECTIONS):
-        tilt = _TILT[0] + (_TILT[1] - _TILT[0]) * math.sqrt((index + 0.5) / _DIRECTIONS)
+    for index in range(views.count):
+        tilt = math.radians(least + (most - least) * math.sqrt((index + 0.5) / views.count))
         about = index * _GOLDEN
         lean = pin.exp3(tilt * np.array([math.cos(about), math.sin(about), 0.0]))
-        turn = pin.exp3(np.array([0.0, 0.0, _ROLLS[index % len(_ROLLS)]]))
+        turn = pin.exp3(np.array([0.0, 0.0, math.radians(views.rolls[index % len(views.rolls)])]))
         rotation = ahead.rotation @ lean @ turn
-        place = board - _DISTANCES[index % len(_DISTANCES)] * rotation[:, 2]
+        place = middle - views.distances[index % len(views.distances)] * rotation[:, 2]
         posture = _posture(robot, q, pin.SE3(rotation, place))
         if posture is None:
             continue
         there = q.copy()
         there[ARM_Q] = posture
         tool = robot.pose(there, robot.tool_id).translation
-        if float((board - tool) @ ahead.rotation[:, 2]) >= _CLEAR:
+        if float((middle - tool) @ ahead.rotation[:, 2]) >= views.clear:
             found.append(posture)
     return _in_order(home, found)
 
@@ -97,7 +122,7 @@ def _in_order(start: Array, postures: list[Array]) -> tuple[Array, ...]:
 
 
 class CameraViews:
-    """One round of pictures of the board. Call `step` in each period until it is finished."""
+    """One round of pictures. Call `step` in each period until it is finished."""
 
     def __init__(
         self,
@@ -105,6 +130,7 @@ class CameraViews:
         follower: Follower,
         saturation: Saturation,
         close_ups: CloseUpClient,
+        prefix: str,
         postures: tuple[Array, ...],
         refusal: Refusal,
     ) -> None:
@@ -115,11 +141,13 @@ class CameraViews:
             follower: Follower for motions of the arm.
             saturation: Braking to rest.
             close_ups: Client for the pictures.
+            prefix: Of the names of the pictures.
             postures: Of `view_postures`.
             refusal: Why the arm cannot be in a posture (7, rad) from a configuration (12); None if it can.
         """
         self._config, self._follower, self._saturation = config, follower, saturation
         self._close_ups, self._refusal, self._dt = close_ups, refusal, 1.0 / config.rate_hz
+        self._prefix = prefix
         self._left = list(enumerate(postures, 1))
         self._all, self._seen = len(postures), 0
         self._homing: Homing | None = Homing(config, follower, self._dt)
@@ -179,7 +207,7 @@ class CameraViews:
         elif way.done and float(np.abs(robot.q[ARM_Q] - self._goal).max()) < _NEAR:
             self._there_at = now if self._there_at is None else self._there_at
             if now - self._there_at >= _REST_S:
-                self._way, self._asked = None, f"{CALIBRATION}{self._number}"
+                self._way, self._asked = None, f"{self._prefix}{self._number}"
                 self._close_ups.ask(self._asked, "seen", now)
         return StepResult(tracking.xi)
 
@@ -192,6 +220,8 @@ class CameraViews:
         return StepResult(self._saturation.ramp(robot.sent))
 
     def _summary(self) -> Reason:
+        if self._prefix == CHECK:
+            return reasons.row_looked_at(self._seen, self._all)
         if self._seen == 0 and self._skipped is not None:
             return self._skipped
         return reasons.board_seen(self._seen, self._all) if self._seen else reasons.board_unseen(self._all)

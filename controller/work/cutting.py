@@ -662,7 +662,7 @@ class Surveying(Stage):
 
 
 class Calibrating(Stage):
-    """Looking at the calibration's board from all around."""
+    """Looking at the calibration's board, or at the row, from several places."""
 
     phase: m.Phase = "CALIBRATION"
 
@@ -777,11 +777,11 @@ class CutSequence:
         survey = Survey(parts.config, parts.follower, parts.saturation, parts.queue, distance, place)
         self._stage = Surveying(parts, survey)
 
-    def look_at_board(self, postures: tuple[Array, ...], refusal: Refusal) -> None:
-        """Start to look at the calibration's board from these postures of the arm (7, rad); `refusal` judges each."""
+    def look_around(self, prefix: str, postures: tuple[Array, ...], refusal: Refusal) -> None:
+        """Start to take pictures from these postures of the arm (7, rad); `refusal` judges each."""
         parts = self._parts
         parts.next_cut.forget()
-        views = CameraViews(parts.config, parts.follower, parts.saturation, parts.close_ups, postures, refusal)
+        views = CameraViews(parts.config, parts.follower, parts.saturation, parts.close_ups, prefix, postures, refusal)
         self._stage = Calibrating(parts, views)
 
     def finish_cut_and_pause(self, why: m.Reason | None) -> None:

@@ -10,7 +10,7 @@ from controller.motion.body import Body
 from controller.motion.follower import Measured, Tracking
 from controller.motion.teleoperation import Teleoperation
 from controller.whole_body.task import Method
-from controller.work.camera_views import view_postures
+from controller.work.camera_views import BOARD, ROW, view_postures
 from controller.work.cutting import CutSequence
 from controller.work.homing import Homing
 from controller.work.point_queue import PointQueue
@@ -84,7 +84,8 @@ class Movement:
         self.teleoperation = Teleoperation(
             config.teleoperation, config.work, body.follower, body.robot.drive, body.dt, self.posture_check.refusal
         )
-        self._view_postures = view_postures(RobotModel(robot_config), np.array(config.work.home))
+        model, home = RobotModel(robot_config), np.array(config.work.home)
+        self._views = {views.prefix: view_postures(model, home, views) for views in (BOARD, ROW)}
         self._homing: Homing | None = None
         #: Tracking of the last step's motion; None without one.
         self.tracking: Tracking | None = None
@@ -110,9 +111,9 @@ class Movement:
         self._clearance.update(inbox.newest(Obstacles))
         self.posture_check.update(inbox.newest(Obstacles))
 
-    def look_at_board(self) -> None:
-        """Begin to look at the calibration's board from all around."""
-        self.sequence.look_at_board(self._view_postures, self.posture_check.refusal)
+    def look_around(self, prefix: str) -> None:
+        """Begin to look at the calibration's board, or at the row, from several places."""
+        self.sequence.look_around(prefix, self._views[prefix], self.posture_check.refusal)
 
     def go_home(self) -> None:
         """Begin to bring the arm home."""

@@ -4,20 +4,24 @@ Nothing is used before an operator says so. What is refused leaves the calibrati
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
+from perception.arrays import Array
 from perception.calibration.board_view import BoardView, find_board
 from perception.calibration.hand_eye import CalibrationError, calibrate
-from perception.segmentation.frame import decode_frame
+from perception.calibration.monitor import MountError, MountMonitor
+from perception.segmentation.frame import View, decode_frame
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.calibration.file import FARTHEST_SHIFT, FARTHEST_TURN, OLD_S
 from rolling_panda.messages.perception import CALIBRATION, CameraMount, CameraState, CloseUpResult
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.model.robot import RobotModel, configuration, mount_pose, pose_message, turn_and_shift
+from rolling_panda.model.wire_values import vector3
 
 #: Keeps a calibration beyond a restart; raises OSError where it cannot.
 Keep = Callable[[CameraMount], None]
@@ -43,17 +47,22 @@ class CameraCalibration:
         self._refused: m.Reason | None = None
         self._views: dict[str, BoardView] = {}
         self._stamp = 0.0
+        self._monitor = MountMonitor()
         self._use(mount)
 
     @property
     def state(self) -> CameraState:
         """State for people."""
+        error = self._monitor.error
         return CameraState(
             header=m.Header(self._stamp, "camera"),
             mount=self._mount,
             views=len(self._views),
             offer=self._offer,
             refused=self._refused,
+            turned=None if error is None else vector3(error.turn),
+            turned_sd=None if error is None else vector3(np.sqrt(np.diag(error.covariance)[:3])),
+            observations=0 if error is None else error.pictures,
             warning=self._warning,
         )
 
@@ -84,6 +93,21 @@ class CameraCalibration:
             reason=reasons.board_not_in_picture() if found is None else None,
         )
 
+    def observe(self, view: View, base: Array, axes: Sequence[Array]) -> None:
+        """Compare the canes of a picture of the row with earlier ones; what is wrong is told, and corrected on offer.
+
+        Args:
+            view: The picture.
+            base: Pose of the base in odom (3).
+            axes: Centre line of each cane from its base outwards, N×3 in odom (m).
+        """
+        before = self._monitor.error
+        self._monitor.observe(view.R, view.t, base, axes)
+        error = self._monitor.error
+        if error is before or error is None or (self._offer is not None and self._offer.source == "board"):
+            return
+        self._offer = None if error.warning is None else self._corrected(error)
+
     def use(self, made_at: float) -> m.Answer:
         """Use the offered calibration from now on, and after a restart.
 
@@ -107,12 +131,30 @@ class CameraCalibration:
 
     @property
     def _warning(self) -> m.Reason | None:
+        if self._monitor.error is not None and self._monitor.error.warning is not None:
+            return self._monitor.error.warning
         age_s = 0.0 if self._mount is None else self._clock() - self._mount.made_at
         return reasons.calibration_old(age_s / 86400.0) if age_s > OLD_S else None
 
     def _use(self, mount: CameraMount | None) -> None:
         self._mount, self._offer = mount, None
         self._model.mount_camera(mount)
+        self._monitor.forget()
+
+    def _corrected(self, error: MountError) -> CameraMount:
+        """The calibration in use, corrected by what the monitor has found."""
+        pose = pose_message(self._T_flange_camera * pin.SE3(pin.exp3(error.turn), error.shift))
+        sd = np.sqrt(np.diag(error.covariance))
+        return CameraMount(
+            position=pose.position,
+            quat_xyzw=pose.quat_xyzw,
+            focal=1.0 if self._mount is None else self._mount.focal,
+            source="work",
+            made_at=self._clock(),
+            views=error.pictures,
+            angle_sd=float(sd[:2].max()),
+            shift_sd=float(sd[3:].max()),
+        )
 
     def _solve(self) -> None:
         """The offer by all pictures so far, or why there is none."""

@@ -285,6 +285,8 @@ class Capsule(Struct, frozen=True, forbid_unknown_fields=True):
 
 #: `point_id` of a picture of the board is this with its number, from 1.
 CALIBRATION: Final = "calibration:"
+#: The same of a picture of the row from another pose, to check the calibration by.
+CHECK: Final = "check:"
 
 
 class CameraMount(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -325,7 +327,7 @@ class CameraState(Message, frozen=True, kw_only=True):
         turned: Rotation of the camera against its calibration by ordinary work (rad, about its axes x right, y down, z
             forward); None before enough was seen.
         turned_sd: Standard deviation of that about each axis (rad).
-        observations: Close-ups that it is from.
+        observations: Pictures that it is from.
         warning: What is wrong with the calibration; None if nothing is known.
     """
 
