@@ -206,6 +206,9 @@ class PerceptionProcess:
         """State of the camera: at once where it has changed, and again for those who come later."""
         told = self._camera_told
         changed = told is None or replace(self._camera, header=told.header) != told
+        warning, before = self._camera.warning, None if told is None else told.warning
+        if warning is not None and (before is None or before.code != warning.code):
+            self._log(warning, now)
         if changed or now - self._camera_sent >= 1.0 / topics.CAMERA_STATE.rate_hz:
             self._out.append(self._camera)
             self._camera_told, self._camera_sent = self._camera, now

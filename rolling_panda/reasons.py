@@ -945,6 +945,16 @@ def accept_start() -> None:
 
 
 @_reason("info", "")
+def press_use_calibration() -> None:
+    """Use the calibration that is offered; the row is then looked at anew."""
+
+
+@_reason("info", "")
+def pause_then_calibration() -> None:
+    """Pause, and use the calibration that is offered."""
+
+
+@_reason("info", "")
 def press_start() -> None:
     """Press Start to go on."""
 
@@ -2462,22 +2472,22 @@ def withdrawn_for_calibration(point: str) -> None:
     """{point} was withdrawn, as the camera has a new calibration."""
 
 
-@_reason("warning", "calibrate it, or use the calibration that is offered")
+@_reason("warning", "cuts may miss")
 def camera_looks_left(angle: float, sd: float) -> None:
     """The camera looks {angle:.1f}° (± {sd:.1f}°) to the left of where it was calibrated."""
 
 
-@_reason("warning", "calibrate it, or use the calibration that is offered")
+@_reason("warning", "cuts may miss")
 def camera_looks_right(angle: float, sd: float) -> None:
     """The camera looks {angle:.1f}° (± {sd:.1f}°) to the right of where it was calibrated."""
 
 
-@_reason("warning", "calibrate it, or use the calibration that is offered")
+@_reason("warning", "cuts may miss")
 def camera_looks_up(angle: float, sd: float) -> None:
     """The camera looks {angle:.1f}° (± {sd:.1f}°) above where it was calibrated."""
 
 
-@_reason("warning", "calibrate it, or use the calibration that is offered")
+@_reason("warning", "cuts may miss")
 def camera_looks_down(angle: float, sd: float) -> None:
     """The camera looks {angle:.1f}° (± {sd:.1f}°) below where it was calibrated."""
 

@@ -57,6 +57,7 @@ def cut_row(
     looks: bool = True,
     segmenter: str = "",
     world: WorldConfig = CALM,
+    checked: bool = False,
 ) -> RowRun:
     """Survey from the start posture, accept up to `points` of what was detected, work through them.
 
@@ -72,6 +73,7 @@ def cut_row(
         plans: False works without the session's plan.
         looks: False cuts without the closer looks before and after.
         segmenter: In place of the configured one.
+        checked: The camera is checked first, and a correction that is offered is used.
         world: Disturbances. Where `odom` drifts, `distance`, `tool_error` and `path_rms` are no truth.
     """
     errors: list[float] = []
@@ -90,6 +92,7 @@ def cut_row(
         config = _config(Path(folder) / "row.toml", pictures, world)
         with ClosedLoop(seed, path, config, method, watch, plans, looks, segmenter) as loop:
             touches, truths = CaneTouches(staying_rods(_row(loop))), judge(_row(loop))
+            warned = _check_camera(loop) if checked else ""
             accepted = [] if along else _accept(loop, points)
             begin, other_s = loop.now, 0.0
             if along:
@@ -148,6 +151,7 @@ def cut_row(
         limits=clock.limits,
         canes_touched=_spared(touches, record.events),
         staying_touched=_named(touches.touched_staying),
+        camera_warning=warned,
     )
 
 
@@ -185,6 +189,18 @@ def _named(touched: dict[Cane, set[str]]) -> dict[str, str]:
         f"vine {vine}, spur {spur}, cane {cane}": ", ".join(sorted(parts))
         for (vine, spur, cane), parts in sorted(touched.items())
     }
+
+
+def _check_camera(loop: ClosedLoop) -> str:
+    """Look at the row from several places, and use the correction that is offered; returns what was told."""
+    loop.run(1.0)
+    loop.command(intents.Arm(user="bench"))
+    loop.command(intents.CheckCamera(user="bench"))
+    loop.run_until(lambda: loop.controller.mode != "AUTO", _LIMIT_S)
+    state = loop.perception.camera.state
+    if state.offer is not None:
+        loop.perception.answer(intents.UseCamera(user="bench", made_at=state.offer.made_at))
+    return "" if state.warning is None else text_of(state.warning)
 
 
 def _accept(loop: ClosedLoop, points: int) -> list[m.QueueEntry]:

@@ -71,6 +71,7 @@ class RowRun:
         canes_touched: Canes, not the ones cut, that a part of the robot other than the blades overlapped with, and
             which parts these were.
         staying_touched: The same of wood that stays when the row is pruned, on canes that were cut too.
+        camera_warning: What a check of the camera has told; empty without a check, or where nothing is wrong.
     """
 
     method: str
@@ -86,6 +87,7 @@ class RowRun:
     limits: dict[str, float]
     canes_touched: dict[str, str]
     staying_touched: dict[str, str]
+    camera_warning: str = ""
 
 
 def tell(run: RowRun, speed: float) -> None:

@@ -114,6 +114,7 @@ def main(argv: Sequence[str]) -> int:
     parser.add_argument("--count", type=_count, default=20, help="rows in each world (default: %(default)s)")
     parser.add_argument("--points", type=_count, default=4, help="most points accepted in a row (default: 4)")
     parser.add_argument("--pictures", type=float, default=0.7, help="pictures a second in motion (default: 0.7)")
+    parser.add_argument("--check-camera", action="store_true", help="check the camera first, and use the correction")
     parser.add_argument("--segmenter", default="", choices=SEGMENTERS, help="in place of the configured one")
     words = parser.parse_args(argv)
     if words.each and words.knob:
@@ -124,7 +125,15 @@ def main(argv: Sequence[str]) -> int:
         runs: list[RowRun] = []
         for seed in range(words.seed, words.seed + words.count):
             begin = time.perf_counter()
-            run = cut_row(seed, words.points, "hierarchy", words.pictures, segmenter=words.segmenter, world=case.world)
+            run = cut_row(
+                seed,
+                words.points,
+                "hierarchy",
+                words.pictures,
+                segmenter=words.segmenter,
+                world=case.world,
+                checked=words.check_camera,
+            )
             runs.append(run)
             results += [{"disturbance": case.name, "level": case.level, **asdict(cut)} for cut in run.cuts]
             right, harmed = sum(cut.true_right for cut in run.cuts), sum(bool(cut.harm) for cut in run.cuts)
@@ -133,6 +142,8 @@ def main(argv: Sequence[str]) -> int:
                 f"{run.contacts} contacts, {time.perf_counter() - begin:.0f} s",
                 flush=True,
             )
+            if run.camera_warning:
+                print(f"    {run.camera_warning}", flush=True)
             for cut in run.cuts:
                 if not cut.true_right:
                     past = "" if cut.past_best is None else f", {1000 * cut.past_best:+.0f} mm past the best place"
@@ -150,6 +161,7 @@ def main(argv: Sequence[str]) -> int:
             {
                 "pictures_hz": words.pictures,
                 "segmenter": words.segmenter,
+                "camera_checked": words.check_camera,
                 "rows": words.count,
                 "first_seed": words.seed,
                 "summary": summary,

@@ -38,8 +38,8 @@ _PRIOR = np.array([0.05] * 3 + [0.004] * 3)
 _KEPT, _NEEDED, _NEEDED_PICTURES = 800, 20, 3
 #: A residual of so many standard deviations counts less (Huber); rounds of reweighting.
 _HUBER, _ROUNDS = 1.5, 6
-#: A turn from this on is told, if its 95 % interval does not touch zero (rad).
-WARNS, _NORMAL_95 = np.radians(0.25), 1.96
+#: A turn from this on is told, if its 95 % region (of two components) does not touch zero (rad).
+WARNS, _REGION_95 = np.radians(0.25), 2.45
 
 
 @dataclass(frozen=True)
@@ -65,9 +65,9 @@ class MountError:
 
     @property
     def interval(self) -> float:
-        """Half the 95 % interval of that angle (rad)."""
+        """Half the extent of the 95 % region in the direction of that angle (rad)."""
         along = np.array([self.turn[0], self.turn[1]]) / max(self.angle, 1e-9)
-        return float(_NORMAL_95 * np.sqrt(along @ self.covariance[:2, :2] @ along))
+        return float(_REGION_95 * np.sqrt(along @ self.covariance[:2, :2] @ along))
 
     @property
     def warning(self) -> Reason | None:

@@ -4,13 +4,15 @@ import numpy as np
 from msgspec.structs import replace
 
 from rolling_panda import commands as intents
-from rolling_panda.messages.perception import CALIBRATION, Capsule, CloseUpRequest
-from rolling_panda.model.robot import ARM_Q
+from rolling_panda.messages.perception import CALIBRATION, CHECK, Capsule, CloseUpRequest
+from rolling_panda.model.robot import ARM_Q, RobotModel
 from tests.support.controller_at_work import CONFIG, finish, robot, run_until
 
+MODEL = RobotModel()
 
-def calibrating(finding="seen", **changes):
-    """A robot that looks at the board, whose pictures end like this."""
+
+def calibrating(finding="seen", command=intents.CalibrateCamera, **changes):
+    """A robot that looks at the board, or at the row, whose pictures end like this."""
     r = robot(**changes)
     pictures = []
 
@@ -23,7 +25,7 @@ def calibrating(finding="seen", **changes):
     r.show(())
     r.step()
     assert r.ask(intents.Arm(user="ada")).ok
-    assert r.ask(intents.CalibrateCamera(user="ada")).ok
+    assert r.ask(command(user="ada")).ok
     return r, pictures
 
 
@@ -50,6 +52,18 @@ def test_a_board_that_is_nowhere_is_told():
     r, _ = calibrating(finding="unseen")
     finish(r, 300.0)
     assert r.state.mode == "READY" and r.state.reason.code == "board_unseen"
+
+
+def test_the_row_is_looked_at_from_a_few_places_with_the_image_upright():
+    r, pictures = calibrating(command=intents.CheckCamera)
+    finish(r, 120.0)
+    names = list(dict.fromkeys(name for name, _, _ in pictures))
+    assert r.state.reason.code == "row_looked_at" and len(names) >= 6 and names[0].startswith(CHECK)
+    assert np.abs([q[:3] for _, q, _ in pictures]).max() < 1e-3
+    poses = [MODEL.pose(q, MODEL.camera_id) for _, q, _ in pictures]
+    assert all(-pose.rotation[2, 1] > 0.85 for pose in poses), "the network knows upright pictures alone"
+    assert all(MODEL.pose(q, MODEL.tool_id).translation[1] < 0.53 for _, q, _ in pictures), "clear of the canes"
+    assert np.ptp([pose.translation for pose in poses], axis=0).max() > 0.2
 
 
 def test_a_pause_ends_it_and_nothing_begins_it_again():

@@ -8,13 +8,19 @@ from msgspec.structs import replace
 from bridge.sim.camera.config import CameraConfig
 from bridge.sim.camera.frame import survey_frame
 from bridge.sim.camera.renderer import Camera
+from bridge.sim.vineyard.config import VineyardConfig
+from bridge.sim.vineyard.grow import grow
 from bridge.sim.vineyard.row import Row
 from bridge.sim.world.config import CALM, WorldConfig
 from bridge.sim.world.errors import draw_errors
 from controller.config import ControllerConfig
-from controller.work.camera_views import view_postures
+from controller.work.camera_views import ROW, view_postures
 from perception.calibration.camera import CameraCalibration
+from perception.config import PerceptionConfig
+from perception.pipeline import Perception
+from perception.segmentation.segmenter import choose_segmenter
 from rolling_panda import reasons
+from rolling_panda.commands import UseCamera
 from rolling_panda.messages.perception import CALIBRATION
 from rolling_panda.model.robot import RobotModel, mount_pose, turn_and_shift
 
@@ -101,6 +107,29 @@ def test_a_camera_far_from_where_it_is_drawn_is_not_offered():
     for frame in photographed(replace(CALM, hand_eye_angle=0.2), board=True):
         camera.look(frame)
     assert camera.state.offer is None and camera.state.refused.code == "calibration_far"
+
+
+@pytest.mark.long
+def test_a_turned_camera_is_told_from_the_row_alone_and_its_correction_takes_the_points_anew():
+    row, kept = grow(VineyardConfig(), 2002), []
+    camera = Camera(CameraConfig(), 2002, replace(CALM, hand_eye_angle=0.01))
+    seeing = Perception(PerceptionConfig(), choose_segmenter("labels", None), keep=kept.append)
+    places = view_postures(MODEL, np.array(ControllerConfig().work.home), ROW)
+    seeing.process(survey_frame(camera, row, MODEL, 1))
+    assert seeing.camera.state.warning is None
+    for number, posture in enumerate(places, 2):
+        seeing.process(survey_frame(camera, row, MODEL, number, arm=tuple(posture.tolist())))
+    state = seeing.camera.state
+    true = pin.log3(draw_errors(replace(CALM, hand_eye_angle=0.01), 2002).hand_eye)
+    assert np.abs(np.array(state.turned) - true).max() < 0.003, "beside 1 mrad of the camera's own"
+    assert state.warning.code == "camera_looks_left" and state.offer.source == "work"
+    points = {point.point_id for point in seeing.points().points}
+    assert points and seeing.answer(UseCamera(user="ada", made_at=state.offer.made_at)).ok
+    assert kept == [state.offer] and not seeing.points().points and len(seeing.withdrawn) == len(points)
+    for number, posture in enumerate(places, 20):
+        seeing.process(survey_frame(camera, row, MODEL, number, arm=tuple(posture.tolist())))
+    assert seeing.camera.state.warning is None and seeing.camera.state.offer is None
+    assert not points & {point.point_id for point in seeing.points().points}, "no name is used twice"
 
 
 def test_an_old_calibration_is_told(pictures):

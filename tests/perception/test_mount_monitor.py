@@ -53,8 +53,8 @@ def test_a_turned_camera_is_found_within_the_interval_that_is_told(turn, noise, 
     assert (np.abs(error.turn - turn) < 4.5 * sd + 1e-4).all() and sd[:2].max() < 0.012
     true = np.hypot(turn[0], turn[1])
     if error.warning is not None:
-        assert true > WARNS - 2.5 * error.interval
-    if true > WARNS + 2.5 * error.interval:
+        assert true > WARNS - 2.0 * error.interval
+    if true > WARNS + 2.0 * error.interval:
         assert error.warning is not None
 
 
@@ -74,7 +74,7 @@ def test_it_tells_the_side_and_the_angle(turn, code):
 
 def test_a_camera_that_is_where_it_was_calibrated_is_not_complained_about():
     straight = [watched((0.0, 0.0, 0.0), np.zeros(3), np.random.default_rng(seed), 0.001) for seed in range(20)]
-    assert [each.error.warning for each in straight] == [None] * 20
+    assert sum(each.error.warning is not None for each in straight) <= 1
 
 
 def test_pictures_from_one_place_or_with_a_base_that_moves_say_nothing():

@@ -86,6 +86,7 @@ def client(server):
         ("home", None, intents.Home(user="ann")),
         ("survey", {"distance": 2.5}, intents.Survey(user="ann", distance=2.5)),
         ("look-again", {"vine": 2, "spur": 3}, intents.LookAgain(user="ann", vine=2, spur=3)),
+        ("camera/check", None, intents.CheckCamera(user="ann")),
         ("camera/calibrate", None, intents.CalibrateCamera(user="ann")),
         ("acknowledge", None, intents.Acknowledge(user="ann")),
         ("reset", {"reason": "checked"}, intents.Reset(user="ann", reason="checked")),

@@ -30,13 +30,14 @@ const PRESSES = Object.freeze({
   accept_start: "review",
   preview_start: "preview",
   approve_start: "preview",
+  press_use_calibration: "calibration",
 });
 
 /** These have banners of their own. */
 const ELSEWHERE = new Set(["mode_stopped", "no_link"]);
 
-/** Warnings that the work waits for. */
-const HALTS = new Set(["mode_paused", "work_waits"]);
+/** Warnings that the work waits for, or should wait for. */
+const HALTS = new Set(["mode_paused", "work_waits", "camera_looks_left", "camera_looks_right", "camera_looks_up", "camera_looks_down"]);
 
 class RpAlarms extends HTMLElement {
   /** @type {Map<string, ReturnType<typeof newRow>>} */
@@ -136,6 +137,7 @@ function newRow(reason) {
 function labelOf(step) {
   if (step === "Acknowledge") return text("bar.checked");
   if (step === "continue") return text("command.Resume");
+  if (step === "calibration") return text("command.UseCamera");
   return COMMANDS.some((each) => each === step) ? text(`command.${step}`) : text(`bar.to_${step}`);
 }
 customElements.define("rp-alarms", RpAlarms);

@@ -1,14 +1,15 @@
 // The robot's commands that have a button, and where else the next step leads.
 
-import { ask } from "../link/api.js";
+import { ask, fetchJson } from "../link/api.js";
 import { openScreen } from "../state/screens.js";
 import { signal } from "../state/signals.js";
 import { text } from "../state/texts.js";
 import { whyNot } from "./allowed.js";
 import { approvePreview, openPreview, whyNoApproval } from "./preview.js";
 
+/** @typedef {import("../link/messages.js").CameraState} CameraState */
 /** @typedef {"Arm"|"Survey"|"Start"|"Pause"|"Resume"|"Home"|"Acknowledge"} CommandName */
-/** @typedef {CommandName|"continue"|"review"|"preview"|"approve"|"reset"} Step */
+/** @typedef {CommandName|"continue"|"review"|"preview"|"approve"|"reset"|"calibration"} Step */
 
 /** @type {readonly CommandName[]} */
 export const COMMANDS = Object.freeze(["Arm", "Survey", "Start", "Pause", "Resume", "Home", "Acknowledge"]);
@@ -42,12 +43,22 @@ export function take(step) {
     case "approve":
       void approvePreview();
       break;
+    case "calibration":
+      void useCalibration();
+      break;
     case "reset":
       document.getElementById("reset-reason")?.focus();
       break;
     default:
       void ask(text(`command.${step}`), `api/${step.toLowerCase()}`, step === "Survey" ? { distance: surveyDistance.get() } : {});
   }
+}
+
+/** The one that is on offer now. */
+async function useCalibration() {
+  /** @type {CameraState|null} */
+  const camera = await fetchJson("api/camera");
+  if (camera?.offer) void ask(text("command.UseCamera"), "api/camera/use", { made_at: camera.offer.made_at });
 }
 
 /** Two requests, each checked by the controller: resuming alone starts no work. */

@@ -846,6 +846,51 @@ export interface SessionReport {
   control: ControlReport[];
 }
 
+/** Calibration of the camera on the hand. */
+export interface CameraMount {
+  /** Origin of the camera in the frame of the arm's flange, panda_link8 (m). */
+  position: Vector3;
+  /** Its rotation there. */
+  quat_xyzw: QuatXyzw;
+  /** Focal length as a multiple of the one that the camera reports. */
+  focal: number;
+  /** `board`, or `work`: from wood that was seen from several places. */
+  source: "board"|"work";
+  /** Time of the calibration. */
+  made_at: number;
+  /** Number of pictures, or of observations of wood. */
+  views: number;
+  /** Root mean square of the reprojection error (px); 0 for `work`. */
+  pixels: number;
+  /** Standard deviation of the direction in which it looks (rad). */
+  angle_sd: number;
+  /** Standard deviation of the position along each axis (m). */
+  shift_sd: number;
+}
+
+/** Perception → server: the camera's calibration, and what is known against it. */
+export interface CameraState {
+  type: "CameraState";
+  /** Stamp of the newest frame. */
+  header: Header;
+  /** The calibration in use; None while the camera is taken to be where it is drawn. */
+  mount: CameraMount|null;
+  /** Pictures of the board since the last calibration began. */
+  views: number;
+  /** A better calibration, which `UseCamera` takes; None without one. */
+  offer: CameraMount|null;
+  /** Why the last calibration gave no offer; None if it gave one, or before the first. */
+  refused: Reason|null;
+  /** Rotation of the camera against its calibration by ordinary work (rad, about its axes x right, y down, z forward); None before enough was seen. */
+  turned: Vector3|null;
+  /** Standard deviation of that about each axis (rad). */
+  turned_sd: Vector3|null;
+  /** Pictures that it is from. */
+  observations: number;
+  /** What is wrong with the calibration; None if nothing is known. */
+  warning: Reason|null;
+}
+
 /** A cut as it is drawn on a picture. */
 export interface DrawnCut {
   /** The point. */

@@ -105,7 +105,7 @@ function ofDevices(state) {
   return [
     ...when(hardwareStopPressed(state), reason("emergency_stop_pressed")),
     ...when(bridge?.cutter === "jammed", reason("cutter_jammed")),
-    ...(camera_warning === null ? [] : [alarm(camera_warning)]),
+    ...(camera_warning ? [alarm(camera_warning, afterCamera(camera_warning, controller))] : []),
     ...when(bridge?.watchdog && atWork && isLive("controller"), reason("commands_missing")),
   ];
 }
@@ -199,6 +199,19 @@ function afterProtectiveStop({ allowed }) {
 /** @param {ControllerState} controller In FAULT, where nobody has to be in control. */
 function afterFault({ allowed }) {
   return [mended(allowed), isSupervisor() ? reason("acknowledge_arm") : reason("supervisor_acknowledges")];
+}
+
+/**
+ * A camera that is found turned comes with its correction; one that was calibrated long ago does not.
+ *
+ * @param {Reason} warning
+ * @param {ControllerState|null} controller
+ */
+function afterCamera({ code }, controller) {
+  if (!code.startsWith("camera_looks_") || !controller) return [];
+  if (pageState.get()?.role === "viewer") return [reason("ask_operator")];
+  const rests = ["IDLE", "READY", "PAUSED"].includes(controller.mode);
+  return rests ? [reason("press_use_calibration")] : [reason("pause_then_calibration")];
 }
 
 /** @param {ControllerState["allowed"]} allowed */
