@@ -119,7 +119,6 @@ class PerceptionProcess:
         self._sequence = 0
         self._camera = perception.camera.state
         self._camera_told: CameraState | None = None
-        self._camera_sent = -1e9
         self._obstacles_sent = self._picture_sent = self._rejected_logged = -1e9
         self._started = False
         self._last_error = ""
@@ -203,15 +202,14 @@ class PerceptionProcess:
         self._picture_cycle = kept | new
 
     def _tell_camera(self, now: float) -> None:
-        """State of the camera: at once where it has changed, and again for those who come later."""
-        told = self._camera_told
-        changed = told is None or replace(self._camera, header=told.header) != told
-        warning, before = self._camera.warning, None if told is None else told.warning
-        if warning is not None and (before is None or before.code != warning.code):
-            self._log(warning, now)
-        if changed or now - self._camera_sent >= 1.0 / topics.CAMERA_STATE.rate_hz:
-            self._out.append(self._camera)
-            self._camera_told, self._camera_sent = self._camera, now
+        """State of the camera where it has changed; a new warning is logged too."""
+        told, camera = self._camera_told, self._camera
+        if told is not None and replace(camera, header=told.header) == told:
+            return
+        if camera.warning is not None and (told is None or told.warning is None):
+            self._log(camera.warning, now)
+        self._camera_told = camera
+        self._out.append(camera)
 
     def _log_refused(self, cause: m.Reason, now: float) -> None:
         # An error that repeats frame after frame is logged once.

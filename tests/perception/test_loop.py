@@ -11,10 +11,10 @@ from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.commands import SetRule
 from rolling_panda.errors import RollingPandaError
-from rolling_panda.messages.perception import Capsule, CloseUpResult, SpurDrawing, SpurPicture
+from rolling_panda.messages.perception import CameraState, Capsule, CloseUpResult, SpurDrawing, SpurPicture
 from rolling_panda.messages.robot import CameraFrame, Intrinsics
 from rolling_panda.reasons import severity_of
-from rolling_panda.topics import CAMERA, CLOSE_UP, EVENT, HEARTBEAT, OBSTACLES, PICTURES, PLANT, POINTS
+from rolling_panda.topics import CAMERA, CAMERA_STATE, CLOSE_UP, EVENT, HEARTBEAT, OBSTACLES, PICTURES, PLANT, POINTS
 from rolling_panda.transport.runner import Runner
 from tests.support.fake_wire import FakeWire
 from tests.support.points import point
@@ -58,6 +58,7 @@ class FakePerception:
 
     def __init__(self):
         self.release, self.noted, self.newest, self.processed = threading.Event(), [], None, 0
+        self.camera = SimpleNamespace(state=CameraState(header=m.Header()))
         self.camera_rays = SimpleNamespace(add=lambda frame: self.noted.append(frame.header.frame_id))
 
     def answer(self, request):
@@ -120,6 +121,23 @@ def test_obstacles_are_sent_once_a_second_from_the_first_frame_on(parts):
         loop.step(tick / 20.0)
     assert len(obstacles) == 4
     assert obstacles[-1].capsules == perception.obstacles
+
+
+def test_the_camera_is_told_when_it_changes_and_a_warning_is_logged_once(parts):
+    wire, perception, loop = parts
+    told, events = wire.sent[CAMERA_STATE.name], wire.sent[EVENT.name]
+    loop.step(0.0)
+    assert [state.warning for state in told] == [None]
+    warning = reasons.camera_looks_left(0.6, 0.2)
+    for second, angle in enumerate((0.6, 0.7, 0.7), 1):
+        perception.camera.state = CameraState(
+            header=m.Header(float(second)), warning=reasons.camera_looks_left(angle, 0.2)
+        )
+        loop.see(str(second), float(second))
+        step_until(loop, lambda count=second: perception.processed == count, float(second))
+        step_until(loop, lambda angle=angle: dict(told[-1].warning.values)["angle"] == angle, float(second))
+    assert [event.reason for event in events if event.reason.code == warning.code] == [warning]
+    assert len({state.header.stamp for state in told}) == 3, "another stamp alone is no news"
 
 
 def test_what_was_left_out_is_told_when_it_changes_and_at_most_once_a_minute(parts):
