@@ -130,12 +130,11 @@ def test_the_camera_is_told_when_it_changes_and_a_warning_is_logged_once(parts):
     assert [state.warning for state in told] == [None]
     warning = reasons.camera_looks_left(0.6, 0.2)
     for second, angle in enumerate((0.6, 0.7, 0.7), 1):
-        perception.camera.state = CameraState(
-            header=m.Header(float(second)), warning=reasons.camera_looks_left(angle, 0.2)
-        )
+        now = reasons.camera_looks_left(angle, 0.2)
+        perception.camera.state = CameraState(header=m.Header(float(second)), warning=now)
         loop.see(str(second), float(second))
         step_until(loop, lambda count=second: perception.processed == count, float(second))
-        step_until(loop, lambda angle=angle: dict(told[-1].warning.values)["angle"] == angle, float(second))
+        step_until(loop, lambda now=now: told[-1].warning == now, float(second))
     assert [event.reason for event in events if event.reason.code == warning.code] == [warning]
     assert len({state.header.stamp for state in told}) == 3, "another stamp alone is no news"
 
