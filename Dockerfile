@@ -9,7 +9,7 @@ ARG BASE_IMAGE=docker.io/library/python:3.11-slim-bookworm
 FROM ${BASE_IMAGE} AS wheel
 WORKDIR /src
 COPY requirements.lock ./
-RUN python -m venv /tools && /tools/bin/pip install --no-cache-dir --require-hashes -r requirements.lock
+RUN python -m venv /tools && /tools/bin/pip install --no-cache-dir --require-hashes -r requirements.lock -c requirements.lock
 COPY pyproject.toml README.md LICENSE ./
 COPY assets assets
 COPY web web
@@ -26,7 +26,7 @@ RUN /tools/bin/pip wheel --no-cache-dir --no-deps --no-build-isolation --wheel-d
 FROM ${BASE_IMAGE} AS install
 ARG LOCK=requirements-run.lock
 COPY requirements-run.lock requirements-real.lock /
-RUN python -m venv /app && /app/bin/pip install --no-cache-dir --require-hashes -r /${LOCK}
+RUN python -m venv /app && /app/bin/pip install --no-cache-dir --require-hashes -r /${LOCK} -c /${LOCK}
 COPY --from=wheel /wheel /wheel
 RUN /app/bin/pip install --no-cache-dir --no-deps /wheel/*.whl
 

@@ -102,7 +102,7 @@ build/docs/.installed: requirements-docs.lock | $(VENV)/.locked
 	@rm -rf build/docs
 	$(PYTHON) -m venv --without-pip build/docs
 	@$(BIN)/pip --python build/docs/bin/python install --quiet --disable-pip-version-check --only-binary :all: \
-		--require-hashes -r requirements-docs.lock || { rm -rf build/docs; \
+		--require-hashes -r requirements-docs.lock -c requirements-docs.lock || { rm -rf build/docs; \
 		echo "The documentation is not checked: the packages of requirements-docs.lock cannot be installed here."; exit 1; }
 	@touch $@
 
@@ -142,23 +142,24 @@ systemd:
 		echo "systemd-analyze is not installed; its tests fail. Install it: sudo apt-get install systemd"; \
 	fi
 
+# Also as constraints: otherwise pip takes the newest release of a package that another one wants with an extra.
 $(VENV)/.locked: requirements.lock
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed: make PYTHON=python3.11")'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock -c requirements.lock
 	@touch $@
 
 # The real robot's drivers, for their tests: both bridges are held to the same contract.
 drivers: $(VENV)/.drivers
 $(VENV)/.drivers: $(VENV)/.project requirements-real.lock
-	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-real.lock
+	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-real.lock -c requirements-real.lock
 	@$(call library,libusb-1.0.so.0,libusb-1.0-0,librealsense needs)
 	@touch $@
 
 # PyTorch's build without CUDA, which is on PyTorch's own package index: give that one to pip (PIP_EXTRA_INDEX_URL).
 training: $(VENV)/.training
 $(VENV)/.training: $(VENV)/.project requirements-training.lock
-	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-training.lock
+	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-training.lock -c requirements-training.lock
 	@touch $@
 
 # The control code becomes machine code when it is first imported: better here than at the first start.

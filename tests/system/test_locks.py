@@ -47,3 +47,12 @@ def test_a_lock_has_hashes_and_no_index_address(lock: str) -> None:
     text = (ROOT / lock).read_text()
     assert text.count("--hash=sha256:") >= len(re.findall(r"^\S+==", text, re.MULTILINE))
     assert "://" not in text
+
+
+@pytest.mark.parametrize("file", ["Makefile", "Dockerfile", "docs/deployment.md"])
+def test_what_is_installed_from_a_lock_is_held_by_it_too(file: str) -> None:
+    """Without it, pip takes the newest release of a package that another one wants with an extra, which has no hash."""
+    installs = re.findall(r"--require-hashes -r (\S+)( -c \S+)?", (ROOT / file).read_text())
+    assert installs
+    for lock, held in installs:
+        assert held == f" -c {lock}"
