@@ -61,32 +61,19 @@ def inpaint_depth(view: View, labels: Labels, config: SkeletonConfig) -> View:
     # Zeros are sorted first: the lower median of the rest.
     middle = np.minimum(found.shape[1] - count + (count - 1) // 2, found.shape[1] - 1)
     own[bad] = np.where(count > 0, found[np.arange(len(found)), middle], np.float32(0.0))
+    # Wood out of range has a depth, and is no hole.
+    hole = (own <= 0.0) & (view.depth[rows, cols] <= config.min_depth)
     out = view.depth.copy()
     out[rows, cols] = own
+    if hole.any():
+        _bridge_holes(out, rows, cols, hole, config.depth_step)
     return replace(view, depth=out)
 
 
-def bridge_holes(view: View, labels: Labels, config: SkeletonConfig) -> View:
-    """The frame with inpainted depth, and in each short hole that is left of it the plane through its rim.
+def _bridge_holes(depth: NDArray[np.float32], rows: Index, cols: Index, hole: Mask, step: float) -> None:
+    """Give each short hole the plane through its rim, in place.
 
     Inverse depth is affine over the image of a plane, and along the image of a straight cane.
-
-    Args:
-        view: The frame.
-        labels: H×W class indices.
-        config: Depth range, and depth step between two canes.
-    """
-    rows, cols = class_pixels(labels, (CANE, NODE, SPUR))
-    depth = inpaint_depth(view, labels, config).depth
-    # Wood out of range has been measured, and is no hole.
-    hole = (depth[rows, cols] <= 0.0) & (view.depth[rows, cols] <= config.min_depth)
-    if hole.any():
-        _bridge(depth, rows, cols, hole, config.depth_step)
-    return replace(view, depth=depth)
-
-
-def _bridge(depth: NDArray[np.float32], rows: Index, cols: Index, hole: Mask, step: float) -> None:
-    """Fill the short holes of an image, in place.
 
     Args:
         depth: Depth image, H×W (m); 0 in the holes.

@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 from perception.arrays import Array, Index, Labels, distance
 from perception.config import SkeletonConfig
 from perception.plant.model import SURFACE_OFFSET, Cane, Node, Plant, Span, Spur
-from perception.segmentation.depth_inpainting import bridge_holes, inpaint_depth
+from perception.segmentation.depth_inpainting import inpaint_depth
 from perception.segmentation.frame import CORDON, OLD_CUT, SPUR, TRUNK, View, class_pixels
 from perception.skeleton.centreline import Centreline, base_radius, centrelines
 from perception.skeleton.fragments import find_cane_pixels, find_fragments
@@ -33,15 +33,12 @@ def perceive_plant(view: View, labels: Labels, config: SkeletonConfig) -> Plant:
         labels: H×W class indices.
         config: Skeleton and topology.
     """
-    view = bridge_holes(view, labels, config)
+    view = inpaint_depth(view, labels, config)
     return _root_canes(view, labels, _trace(view, labels, config), config)
 
 
 def trace_canes(view: View, labels: Labels, config: SkeletonConfig) -> list[Centreline]:
-    """Centre lines of the canes of one frame, not yet rooted; arguments as of `perceive_plant`.
-
-    A cut rests on them, so they have measured depth alone: no holes are bridged.
-    """
+    """Centre lines of the canes of one frame, not yet rooted; arguments as of `perceive_plant`."""
     return _trace(inpaint_depth(view, labels, config), labels, config)
 
 

@@ -12,7 +12,7 @@ from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
 from perception.config import SkeletonConfig
-from perception.segmentation.depth_inpainting import bridge_holes, inpaint_depth
+from perception.segmentation.depth_inpainting import inpaint_depth
 from perception.segmentation.frame import View
 from rolling_panda import messages as m
 
@@ -54,10 +54,6 @@ def picture(depth: np.ndarray, labels: np.ndarray) -> View:
     return View(0, 0.0, intrinsics, depth.astype(np.float32), labels, b"", np.eye(3), np.zeros(3))
 
 
-def bridged(view: View, labels: np.ndarray) -> np.ndarray:
-    return bridge_holes(view, labels, SkeletonConfig()).depth
-
-
 def leaning_cane(lean: float) -> tuple[np.ndarray, np.ndarray]:
     """Depth and classes of a cane five pixels wide, 1.2 m away, whose inverse depth grows by `lean` a row."""
     labels = np.zeros((480, 848), dtype=np.uint8)
@@ -78,8 +74,8 @@ def test_a_stretch_of_cane_without_depth_is_bridged_along_the_cane(lean: float, 
     hole[100 + begin : 100 + begin + length] = labels[100 + begin : 100 + begin + length] == CANE
     measured = depth + np.random.default_rng(noise).normal(0.0, 0.004, depth.shape) * (labels == CANE)
     view = picture(np.where(hole, 0.0, measured), labels)
-    filled = bridged(view, labels)
-    assert np.abs(filled - depth)[hole].max() < 0.015
+    bridged = inpaint_depth(view, labels, SkeletonConfig()).depth
+    assert np.abs(bridged - depth)[hole].max() < 0.015
 
 
 def test_a_hole_takes_the_depth_of_its_own_cane_and_not_of_one_that_crosses_behind_it():
@@ -88,8 +84,8 @@ def test_a_hole_takes_the_depth_of_its_own_cane_and_not_of_one_that_crosses_behi
     depth = np.where((labels == CANE) & (depth > 2.0), 1.5, depth)
     hole = np.zeros_like(labels, dtype=bool)
     hole[175:188, 400:405] = True
-    filled = bridged(picture(np.where(hole, 0.0, depth), labels), labels)
-    assert np.abs(filled - depth)[175:188, 402].max() < 0.01
+    bridged = inpaint_depth(picture(np.where(hole, 0.0, depth), labels), labels, SkeletonConfig()).depth
+    assert np.abs(bridged - depth)[175:188, 402].max() < 0.01
 
 
 def test_wood_without_any_depth_gets_none_from_nearer_wood_that_it_touches():
@@ -97,7 +93,7 @@ def test_wood_without_any_depth_gets_none_from_nearer_wood_that_it_touches():
     depth, labels = leaning_cane(0.0)
     labels[180:183, 300:500] = CANE
     depth = np.where((labels == CANE) & (depth > 2.0), 0.0, depth)
-    left = bridged(picture(depth, labels), labels)
+    left = inpaint_depth(picture(depth, labels), labels, SkeletonConfig()).depth
     assert not left[180:183, 300:395].any() and not left[180:183, 410:500].any()
 
 
@@ -105,4 +101,4 @@ def test_a_hole_far_from_all_depth_stays_one():
     depth, labels = leaning_cane(0.0)
     labels[20:40, 50:55] = CANE
     depth[20:40, 50:55] = 0.0
-    assert not bridged(picture(depth, labels), labels)[20:40, 50:55].any()
+    assert not inpaint_depth(picture(depth, labels), labels, SkeletonConfig()).depth[20:40, 50:55].any()
