@@ -18,6 +18,8 @@ _REACH = 0.03
 _THERE = 0.008
 #: Least share of the known wood that a shift must explain, and by how much a larger shift must explain more.
 _EXPLAINED, _BETTER = 0.5, 0.15
+#: Share of the known nodes that a shift along the cane must explain, and by how much more than no shift.
+_AGREED, _CLEARLY = 0.4, 0.25
 #: Spacing of samples of a line (m).
 _SPACING = 0.002
 
@@ -65,7 +67,11 @@ def _across(axis: Array, line: Array, position: Array) -> Array | None:
 
 
 def _along(known: Array, seen: Array, along: Array) -> float:
-    """Shift along the cane (m) that at least two nodes agree on; 0 where the nodes are as expected, or say nothing."""
+    """Shift along the cane (m) that at least two nodes agree on; 0 where the nodes are as expected, or say nothing.
+
+    Where there are many nodes, or some are not seen, a shift by an internode explains some of them by chance. So it has
+    to explain clearly more of them than no shift does.
+    """
     if not len(known) or not len(seen):
         return 0.0
     apart = seen[None] - known[:, None]
@@ -77,7 +83,9 @@ def _along(known: Array, seen: Array, along: Array) -> float:
 
     shifts = steps[beside & (np.abs(steps) <= _REACH)].tolist()
     best = max(shifts, key=lambda shift: (explained(shift), -abs(shift)), default=0.0)
-    return float(best) if explained(best) >= 2 and explained(best) > explained(0.0) else 0.0
+    more = explained(best) - explained(0.0)
+    agreed = explained(best) >= 2 and explained(best) >= _AGREED * len(known)
+    return float(best) if agreed and more > max(1.0, _CLEARLY * len(known)) else 0.0
 
 
 def _nodes(lines: list[Centreline]) -> Array:

@@ -54,6 +54,12 @@ def test_one_node_alone_shifts_nothing_along_the_cane() -> None:
     assert picture_shift(known(one), seen((0.0, 0.0, 0.02), one), HERE, UP) == pytest.approx(np.zeros(3))
 
 
+def test_nodes_that_are_not_seen_do_not_shift_the_picture_by_an_internode() -> None:
+    """The two upper nodes have no depth, and one more is seen below those that are known."""
+    there, picture = {0.0: (0.946, 0.974, 1.002, 1.03)}, {0.0: (0.918, 0.946, 0.974)}
+    assert picture_shift(known(there), seen((0.0, 0.0, 0.0), picture), HERE, UP) == pytest.approx(np.zeros(3))
+
+
 def test_without_anything_known_there_is_no_shift_and_what_fits_nowhere_has_none() -> None:
     assert picture_shift(NOTHING_KNOWN, seen((0.02, 0.0, 0.0)), HERE, UP) == pytest.approx(np.zeros(3))
     assert picture_shift(known(), [], HERE, UP) is None
