@@ -124,7 +124,7 @@ def test_a_place_left_open_is_looked_at_from_both_sides_and_from_before_it():
     assert r.ask(intents.LookAgain(user="ada", vine=1, spur=2)).ok
     stood = []
     run_until(r, lambda s: s is not None and s.mode == "AUTO", 2.0)
-    assert any("READY → AUTO: look again by ada" in text for text in r.events)
+    assert any("READY → AUTO: ada pressed look again" in text for text in r.events)
     while r.state.mode == "AUTO":
         assert r.now < 60.0
         before = r.q[0]
