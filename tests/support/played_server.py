@@ -18,7 +18,7 @@ from rolling_panda import reasons
 from rolling_panda.commands import COMMANDS
 from rolling_panda.messages import page as page_messages
 from rolling_panda.messages import types as types_messages
-from rolling_panda.messages.perception import SpurDrawing
+from rolling_panda.messages.perception import CameraState, SpurDrawing
 from rolling_panda.messages.supervision import ControlState, ReplayState, SessionReport, StopState, Timeline
 from rolling_panda.reasons import said
 from rolling_panda.resources import resource
@@ -132,6 +132,7 @@ class PlayedServer:
     replay: ReplayState | None = None
     plain_wire: bool = False
     relaxed_limits: tuple[m.Reason, ...] = ()
+    camera: CameraState = field(default_factory=lambda: CameraState(header=m.Header()))
     online: bool = True
     silent: bool = False
     #: How long ago it heard each process, where none is gone (s).
@@ -181,9 +182,9 @@ class PlayedServer:
             return JSONResponse({"arm_limits": [(-2.9, 2.9)] * 7})
         if path == "/api/sign-in":
             return JSONResponse({"password": False})
-        for name, told in (("report", self.report), ("timeline", self.timeline), ("diagnostics", self.diagnostics)):
+        for name in ("report", "timeline", "diagnostics", "camera"):
             if path == f"/api/{name}":
-                return Response(msgspec.json.encode(told), media_type="application/json")
+                return Response(msgspec.json.encode(getattr(self, name)), media_type="application/json")
         if path.startswith("/api/cuts/"):
             _, _, _, cut_id, moment = path.removesuffix(".jpg").split("/")
             picture = self.cut_pictures.get((cut_id, moment))
@@ -271,6 +272,7 @@ class PlayedServer:
             replay=self.replay,
             plain_wire=self.plain_wire,
             relaxed_limits=self.relaxed_limits,
+            camera_warning=self.camera.warning,
         )
 
     def page_points(self) -> page_messages.PagePoints:

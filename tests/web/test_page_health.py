@@ -5,7 +5,9 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
+from rolling_panda import messages as m
 from rolling_panda import reasons
+from rolling_panda.messages.perception import CameraMount, CameraState
 from rolling_panda.messages.supervision import StopState
 from tests.support.played_page import box_of, until
 from tests.support.played_server import PlayedServer, bridge, controller, point
@@ -126,6 +128,24 @@ def test_each_alarm_comes_with_its_state_and_goes(page: Page, server: PlayedServ
             expect(row).to_have_attribute("data-severity", reasons.CATALOGUE[code].severity)
             if act := reasons.CATALOGUE[code].act:
                 expect(row.locator(".act")).to_contain_text(act[1:])
+
+
+def test_a_camera_that_is_found_turned_is_told_and_its_correction_is_a_press_away(
+    page: Page, server: PlayedServer
+) -> None:
+    offer = CameraMount(position=(0.0, -0.07, 0.04), quat_xyzw=(0.0, 0.0, 0.0, 1.0), source="work", made_at=1.8e9)
+    told = CameraState(header=m.Header(), offer=offer, warning=reasons.camera_looks_left(0.6, 0.2))
+    server.controller, server.camera = controller("AUTO"), told
+    row = page.locator('#alarms [data-code="camera_looks_left"]')
+    expect(row).to_be_visible()
+    expect(row).to_contain_text("0.6° (± 0.2°) to the left")
+    expect(row.locator(".act")).to_contain_text("Pause")
+    expect(row.locator(".alarm-press")).to_be_hidden()
+    server.controller = controller("READY")
+    row.locator(".alarm-press").click()
+    until(page, lambda: ("/api/camera/use", {"made_at": 1.8e9}) in server.posted)
+    server.camera = CameraState(header=m.Header(), mount=offer)
+    expect(row).to_have_count(0)
 
 
 def test_every_limit_that_is_set_wider_than_usual_is_told(page: Page, server: PlayedServer) -> None:
