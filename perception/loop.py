@@ -202,11 +202,12 @@ class PerceptionProcess:
         self._picture_cycle = kept | new
 
     def _tell_camera(self, now: float) -> None:
-        """State of the camera where it has changed; a new warning is logged too."""
+        """State of the camera where it has changed; a warning of another kind is logged too."""
         told, camera = self._camera_told, self._camera
         if told is not None and replace(camera, header=told.header) == told:
             return
-        if camera.warning is not None and (told is None or told.warning is None):
+        before = None if told is None or told.warning is None else told.warning.code
+        if camera.warning is not None and camera.warning.code != before:
             self._log(camera.warning, now)
         self._camera_told = camera
         self._out.append(camera)

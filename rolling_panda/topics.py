@@ -194,7 +194,7 @@ OBSTACLES = Topic(
 )
 CAMERA_STATE = Topic(
     "perception/camera", perception.CameraState, "perception", "server", 0.5, "DATA_LOW", "DROP",
-    "calibration of the camera and what is known against it; also at once on change", latched=True,
+    "calibration of the camera, and the monitor's estimate of its error; also at once on change", latched=True,
 )
 SCENERY = Topic(
     "scenery", perception.Scenery, "bridge", "server", 0.5, "BACKGROUND", "DROP",

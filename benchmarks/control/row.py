@@ -192,7 +192,7 @@ def _named(touched: dict[Cane, set[str]]) -> dict[str, str]:
 
 
 def _check_camera(loop: ClosedLoop) -> str:
-    """Look at the row from several places, and use the correction that is offered; returns what was told."""
+    """Check the camera and use the correction that is offered; returns the warning, empty without one."""
     loop.run(1.0)
     loop.command(intents.Arm(user="bench"))
     loop.command(intents.CheckCamera(user="bench"))

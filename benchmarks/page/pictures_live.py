@@ -22,7 +22,7 @@ def walk_through(page: Any, album: Keeps, port: int, seed: int) -> None:
     """From signing in to leading the tool by hand, on a demo of its own."""
     demo = Demo(port, seed)
     try:
-        # The hints for newcomers would lie over what is pictured.
+        # The first hints would cover the view.
         page.add_init_script("localStorage.setItem('setting.hints', 'seen')")
         page.goto(f"http://127.0.0.1:{port}/")
         page.locator("#token").wait_for()

@@ -103,11 +103,11 @@ def of_holder(mode: Mode) -> tuple[str, ...]:
 def allowed(now: float, situation: Situation) -> dict[str, Reason | None]:
     """Reason why each command, or a hold, would be refused now; None if it would be taken with valid arguments.
 
-    Commands about control are left out.
+    Those of other processes are told where they depend on the mode. Commands about control are left out.
     """
     commands = {
         command.name: refusal(command, now, situation)
         for command in COMMANDS
-        if command.process == "controller" and command.tag != "control"
+        if (command.process == "controller" and command.tag != "control") or command.modes
     }
     return commands | {HOLD: hold_refusal(situation)}

@@ -167,7 +167,7 @@ class CameraViews:
             now: Monotonic time (s).
         """
         if self._homing is not None:
-            return self._home(robot)
+            return self._home(robot, self._homing)
         if self._asked:
             return self._look(robot, now)
         if self._way is not None:
@@ -184,10 +184,8 @@ class CameraViews:
         self._timeout.start(self._way.duration)
         return self._move(robot, self._way, now)
 
-    def _home(self, robot: Measured) -> StepResult:
+    def _home(self, robot: Measured, homing: Homing) -> StepResult:
         """To the survey posture, before the first picture and after the last."""
-        homing = self._homing
-        assert homing is not None
         xi = homing.step(robot)
         if homing.blocked:
             return StepResult(self._saturation.ramp(robot.sent), pause=reasons.calibration_blocked(homing.blocked))

@@ -9,6 +9,7 @@ of this one.
 """
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -270,7 +271,7 @@ class CutTask:
     plan: CutPlan
 
 
-class Stage:
+class Stage(ABC):
     """A stage of the sequence."""
 
     #: Phase on the wire.
@@ -294,6 +295,7 @@ class Stage:
         """Plans of the cuts that the motion begins or ends at."""
         return ()
 
+    @abstractmethod
     def step(self, robot: Measured, now: float) -> "Step":
         """One period.
 
@@ -301,7 +303,6 @@ class Stage:
             robot: Measured robot.
             now: Monotonic time (s).
         """
-        raise NotImplementedError
 
     def _left(self, point_id: str, accepted: m.PruningPoint | None) -> m.Reason | None:
         """Why the point may no longer be approached; None if it may."""

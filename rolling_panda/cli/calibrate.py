@@ -12,12 +12,10 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
-import httpx
-
 from rolling_panda.errors import InputError, ServiceError
 
-#: Time between looks at the robot, and time limit of a calibration (s).
-_POLL_S, _LIMIT_S = 0.3, 300.0
+#: Time between looks at the robot, for the state to show that it has begun, and time limit of a calibration (s).
+_POLL_S, _BEGUN_S, _LIMIT_S = 0.3, 3.0, 300.0
 _DPI, _SQUARE_PX = 600, 240
 
 
@@ -70,14 +68,14 @@ def _calibrate_camera(arguments: argparse.Namespace) -> int:
             "Is the board 45 cm before the camera in its survey posture, and nobody near the arm? It will move."
         ):
             return 1
-        if page.get("state")["controller"]["mode"] == "IDLE":
+        if page.mode() == "IDLE":
             page.post("arm")
         page.post("camera/calibrate")
-        state = page.watch()
-        print(f"\n{page.reason_since()}")
+        mode = page.watch()
+        print(f"\n{page.newest_event()}")
         result = page.get("camera")
         offer = result["offer"]
-        if state["controller"]["mode"] != "READY" or offer is None:
+        if mode != "READY" or offer is None:
             print(f"No calibration: {page.words(result['refused'])}" if result["refused"] else "No calibration.")
             print("The calibration in use stays as it is.")
             return 1
@@ -111,6 +109,10 @@ class _Page:
         tokens = parse_qs(parts.query).get("token", [])
         if not parts.scheme.startswith("http") or (not tokens and user is None):
             raise InputError(f"{link!r} is no sign-in link; copy it from Invite on the page, or give --user NAME")
+        # No other command needs it, and it takes as long to import as the rest.
+        import httpx
+
+        self._unanswered = httpx.HTTPError
         address = f"{parts.scheme}://{parts.netloc}"
         self._client = httpx.Client(base_url=address, headers={"Origin": address}, timeout=10.0, trust_env=False)
         body = {"token": tokens[0]} if user is None else {"user": user, "password": getpass.getpass()}
@@ -130,19 +132,31 @@ class _Page:
         """Ask for something; returns what the robot says to it."""
         return str(self._ask("POST", what, body).get("reason", ""))
 
-    def watch(self) -> dict[str, Any]:
-        """Watch the robot until its work has ended; returns its state then."""
-        end = time.monotonic() + _LIMIT_S
-        while time.monotonic() < end:
-            time.sleep(_POLL_S)
-            state = self.get("state")
-            print(f"\r{self.get('camera')['views']} views of the board", end="", flush=True)
-            if state["controller"]["mode"] != "AUTO":
-                return dict(state)
+    def mode(self) -> str:
+        """Mode of the robot."""
+        controller = self.get("state")["controller"]
+        if controller is None:
+            raise ServiceError("the controller has not reported; is it running?")
+        return str(controller["mode"])
+
+    def watch(self) -> str:
+        """Watch the robot until its work has ended; returns its mode then. Ctrl-C pauses it."""
+        begun, start = False, time.monotonic()
+        try:
+            while time.monotonic() - start < _LIMIT_S:
+                time.sleep(_POLL_S)
+                mode = self.mode()
+                print(f"\r{self.get('camera')['views']} views of the board", end="", flush=True)
+                begun = begun or mode == "AUTO"
+                if mode != "AUTO" and (begun or time.monotonic() - start > _BEGUN_S):
+                    return mode
+        except KeyboardInterrupt:
+            self.post("pause")
+            raise
         self.post("pause")
         raise ServiceError(f"the calibration has not ended within {_LIMIT_S:.0f} s; the robot was paused")
 
-    def reason_since(self) -> str:
+    def newest_event(self) -> str:
         """The newest line of the robot's log."""
         events = self.get("events")["events"]
         return str(events[-1]["text"]) if events else ""
@@ -159,7 +173,7 @@ class _Page:
     def _ask(self, method: str, what: str, body: dict[str, Any] | None = None) -> Any:
         try:
             answer = self._client.request(method, f"/api/{what}", json=body)
-        except httpx.HTTPError as error:
+        except self._unanswered as error:
             raise ServiceError(f"the page does not answer: {error}; is the address right?") from error
         if answer.is_success:
             return answer.json() if answer.content else {}

@@ -316,7 +316,7 @@ class CameraMount(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
 
 
 class CameraState(Message, frozen=True, kw_only=True):
-    """Perception → server: the camera's calibration, and what is known against it.
+    """Perception → server: the camera's calibration, and the monitor's estimate of its error.
 
     Attributes:
         header: Stamp of the newest frame.

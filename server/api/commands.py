@@ -99,7 +99,7 @@ def _add(router: APIRouter, robot: RobotContext, command: Command) -> None:
         session: Annotated[Session, Depends(role)], fields: Annotated[dict[str, Any], Depends(read)]
     ) -> Response:
         asked = command.message(user=session.user, **fields)
-        refused = _wrong_mode(robot, command) if check is None else check(robot, asked)
+        refused = _not_now(robot, command) if check is None else check(robot, asked)
         if refused is not None:
             robot.log.note(reasons.request_refused(command.name, session.user, refused))
             return answer(Result(409, refused))
@@ -116,15 +116,13 @@ def _add(router: APIRouter, robot: RobotContext, command: Command) -> None:
     )(ask)
 
 
-def _wrong_mode(robot: RobotContext, command: Command) -> m.Reason | None:
-    """Why a command to perception is refused in the robot's mode, which the controller tells; None if it is not."""
+def _not_now(robot: RobotContext, command: Command) -> m.Reason | None:
+    """Why the controller does not allow a command of another process that depends on the mode; None if it does."""
     if command.process == "controller" or not command.modes:
         return None
     controller = robot.link.controller.peek()
-    if controller is None:
-        return reasons.not_reported("controller")
-    mode = controller.message.mode
-    return None if mode in command.modes else reasons.wrong_mode(command.name, ", ".join(command.modes), mode)
+    unknown = reasons.not_reported("controller")
+    return unknown if controller is None else controller.message.allowed.get(command.name, unknown)
 
 
 class Control(ControlState, frozen=True, kw_only=True, tag="ControlState"):

@@ -103,7 +103,7 @@ def state_router(robot: RobotContext) -> APIRouter:
 
     @router.get("/camera", tags=["state"], responses=query(CameraState, UNAVAILABLE))
     async def camera(session: Caller) -> Response:
-        """The camera's calibration, the one on offer, and what is known against it."""
+        """The camera's calibration, the one on offer, and the monitor's estimate of its error."""
         received = robot.link.camera_state.peek()
         if received is None:
             return answer(Result(503, reasons.not_reported("perception")))

@@ -207,6 +207,13 @@ def test_what_only_the_work_knows_is_told():
     assert moved == reasons.another_comes_first("b", "a")
 
 
+def test_what_perception_answers_in_some_modes_alone_is_told():
+    assert in_state()["UseCamera"] is None
+    at_work = in_state("points", 0.2, intents.Arm, intents.AcceptAll, intents.Start, 0.2)
+    assert at_work["UseCamera"] == reasons.wrong_mode("UseCamera", "IDLE, READY, PAUSED", "AUTO")
+    assert "MovePoint" not in at_work
+
+
 def test_a_reset_under_way_is_told():
     world = World()
     world.robot.stop()

@@ -123,20 +123,20 @@ def test_obstacles_are_sent_once_a_second_from_the_first_frame_on(parts):
     assert obstacles[-1].capsules == perception.obstacles
 
 
-def test_the_camera_is_told_when_it_changes_and_a_warning_is_logged_once(parts):
+def test_the_camera_is_told_when_it_changes_and_a_warning_of_each_kind_is_logged_once(parts):
     wire, perception, loop = parts
     told, events = wire.sent[CAMERA_STATE.name], wire.sent[EVENT.name]
     loop.step(0.0)
     assert [state.warning for state in told] == [None]
-    warning = reasons.camera_looks_left(0.6, 0.2)
-    for second, angle in enumerate((0.6, 0.7, 0.7), 1):
-        now = reasons.camera_looks_left(angle, 0.2)
+    old, turned, more = reasons.calibration_old(91.0), *(reasons.camera_looks_left(angle, 0.2) for angle in (0.6, 0.7))
+    for second, now in enumerate((old, turned, more, more), 1):
         perception.camera.state = CameraState(header=m.Header(float(second)), warning=now)
         loop.see(str(second), float(second))
         step_until(loop, lambda count=second: perception.processed == count, float(second))
         step_until(loop, lambda now=now: told[-1].warning == now, float(second))
-    assert [event.reason for event in events if event.reason.code == warning.code] == [warning]
-    assert len({state.header.stamp for state in told}) == 3, "another stamp alone is no news"
+    kinds = (old.code, turned.code)
+    assert [event.reason for event in events if event.reason.code in kinds] == [old, turned]
+    assert len({state.header.stamp for state in told}) == 4, "another stamp alone is no news"
 
 
 def test_what_was_left_out_is_told_when_it_changes_and_at_most_once_a_minute(parts):

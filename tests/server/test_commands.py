@@ -1,3 +1,4 @@
+import functools
 import json
 import threading
 import time
@@ -328,6 +329,21 @@ def test_state_and_points_are_what_the_robot_said_last(server, client):
     assert state["role"] == "supervisor"
     rows = eventually(lambda: client.get("/api/points").json()["points"])
     assert [(row["point"]["point_id"], row["entry"]["state"]) for row in rows] == [("p9", "ACCEPTED")]
+
+
+def test_a_calibration_is_used_only_where_the_controller_allows_it(server, client):
+    why = reasons.wrong_mode("UseCamera", "IDLE, READY, PAUSED", "AUTO")
+
+    def asked(code):
+        answer = client.post("/api/camera/use", json={"made_at": 1.8e9})
+        return answer if answer.status_code == code else None
+
+    for refusal, code in ((why, 409), (None, 200)):
+        told = msgspec.structs.replace(controller_state(), allowed={"UseCamera": refusal})
+        server.wire.deliver(topics.CONTROLLER, told)
+        answer = eventually(functools.partial(asked, code))
+        assert answer.json()["reason"] == (reasons.text_of(why) if refusal else "done")
+    assert server.wire.asked == [intents.UseCamera(user="ann", made_at=1.8e9)]
 
 
 def holds(client, **wanted):

@@ -41,13 +41,13 @@ STILL = (
     "<style>body{margin:0}img{width:100vw;height:100vh;object-fit:cover}</style>"
     "<img id=root src=/viser/still.jpg>"
 )
-COMMAND_NAMES = tuple(command.name for command in COMMANDS if command.process == "controller")
+COMMAND_NAMES = tuple(command.name for command in COMMANDS if command.process == "controller" or command.modes)
 ALLOWED = {
-    "IDLE": ("Arm",),
-    "READY": ("Start", "Home", "Teleoperation"),
+    "IDLE": ("Arm", "UseCamera"),
+    "READY": ("Start", "Home", "Teleoperation", "UseCamera"),
     "AUTO": ("Pause",),
     "TELEOP": ("Pause", "Teleoperation"),
-    "PAUSED": ("Resume",),
+    "PAUSED": ("Resume", "UseCamera"),
     "ESTOP_LATCHED": ("Reset",),
 }
 

@@ -19,7 +19,7 @@ _BRIGHT, _DARK = 225.0, 30.0
 
 
 class StandingBoard:
-    """A sheet with the board. It hides what is behind it."""
+    """A sheet with the board, which occludes the row behind it."""
 
     def __init__(self, seed: int) -> None:
         """Put it up."""
@@ -37,8 +37,8 @@ class StandingBoard:
             origin: Of the rays (3, world).
             rays: One for each pixel, row by row (N×3), of length 1 along the optical axis.
             columns: Of the image.
-            depth: Of what stands behind (N, m); written.
-            color: Its colours (N×3); written.
+            depth: Depth image without the board (N, m), updated in place.
+            color: Colour image without the board (N×3), updated in place.
         """
         local, start = rays.astype(np.float64) @ self._R, (origin - self._t) @ self._R
         away = -start[2] / np.where(np.abs(local[:, 2]) < 1e-9, 1e-9, local[:, 2])

@@ -25,6 +25,7 @@ export function isCommand(step) {
 export function whyNotStep(step) {
   if (step === "approve") return whyNoApproval();
   if (step === "continue") return whyNot("Resume");
+  if (step === "calibration") return whyNot("UseCamera");
   return isCommand(step) ? whyNot(step) : null;
 }
 

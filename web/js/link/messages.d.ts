@@ -868,7 +868,7 @@ export interface CameraMount {
   shift_sd: number;
 }
 
-/** Perception → server: the camera's calibration, and what is known against it. */
+/** Perception → server: the camera's calibration, and the monitor's estimate of its error. */
 export interface CameraState {
   type: "CameraState";
   /** Stamp of the newest frame. */

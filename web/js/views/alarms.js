@@ -210,8 +210,7 @@ function afterFault({ allowed }) {
 function afterCamera({ code }, controller) {
   if (!code.startsWith("camera_looks_") || !controller) return [];
   if (pageState.get()?.role === "viewer") return [reason("ask_operator")];
-  const rests = ["IDLE", "READY", "PAUSED"].includes(controller.mode);
-  return rests ? [reason("press_use_calibration")] : [reason("pause_then_calibration")];
+  return [reason(controller.allowed["UseCamera"] === null ? "press_use_calibration" : "pause_then_calibration")];
 }
 
 /** @param {ControllerState["allowed"]} allowed */

@@ -1,0 +1,142 @@
+"""`rolling-panda calibrate`: the board as a file, and the camera through a page that is played."""
+
+import functools
+import json
+from pathlib import Path
+
+import httpx
+import msgspec
+import numpy as np
+import pytest
+from PIL import Image
+
+from rolling_panda import reasons
+from rolling_panda.calibration.board import COLUMNS, MARGIN, ROWS, SQUARE
+from rolling_panda.cli import calibrate
+from rolling_panda.cli.main import main
+
+LINK = "http://panda.test:8000/sign-in?token=abc"
+OFFER = {
+    "made_at": 1.8e9,
+    "views": 25,
+    "source": "board",
+    "pixels": 0.1,
+    "angle_sd": 1e-4,
+    "shift_sd": 1e-4,
+    "focal": 1.0,
+}
+
+
+class PlayedPage:
+    """The page's server. `modes` are told one after another, the last one for ever."""
+
+    def __init__(self) -> None:
+        self.modes = ["READY", "READY", "AUTO", "AUTO", "READY"]
+        self.offer: dict[str, object] | None = OFFER
+        self.refused: dict[str, object] | None = None
+        self.refusal: dict[str, int] = {}
+        self.interrupts = False
+        self.posted: list[tuple[str, object]] = []
+
+    def answer(self, request: httpx.Request) -> httpx.Response:
+        path = request.url.path.removeprefix("/api/")
+        if request.method == "POST":
+            self.posted.append((path, json.loads(request.content) if request.content else None))
+            return httpx.Response(self.refusal.get(path, 200), json={"reason": f"{path} is told"})
+        if path == "state":
+            if self.interrupts and ("camera/calibrate", None) in self.posted and ("pause", None) not in self.posted:
+                raise KeyboardInterrupt
+            mode = self.modes[0] if len(self.modes) == 1 else self.modes.pop(0)
+            return httpx.Response(200, json={"controller": {"mode": mode}})
+        if path == "camera":
+            return httpx.Response(200, json={"mount": None, "views": 7, "offer": self.offer, "refused": self.refused})
+        return httpx.Response(200, json={"events": [{"text": "25 of 25 pictures show the board"}]})
+
+
+@pytest.fixture
+def page(monkeypatch: pytest.MonkeyPatch) -> PlayedPage:
+    played = PlayedPage()
+    transport = httpx.MockTransport(played.answer)
+    monkeypatch.setattr(httpx, "Client", functools.partial(httpx.Client, transport=transport))
+    monkeypatch.setattr(calibrate, "_POLL_S", 0.0)
+    return played
+
+
+def test_the_board_prints_in_its_own_size(tmp_path: Path) -> None:
+    out = tmp_path / "board.png"
+    assert main(["calibrate", "board", "--out", str(out)]) == 0
+    with Image.open(out) as image:
+        size_m = np.array(image.size) / np.array(image.info["dpi"]) * 0.0254
+    assert size_m == pytest.approx([COLUMNS * SQUARE + 2 * MARGIN, ROWS * SQUARE + 2 * MARGIN], abs=2e-4)
+
+
+def test_a_board_that_cannot_be_written_is_an_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["calibrate", "board", "--out", str(tmp_path / "nowhere" / "board.png")]) != 0
+    assert "cannot write the board" in capsys.readouterr().err
+
+
+def test_the_camera_is_calibrated_and_the_result_used(page: PlayedPage, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["calibrate", "camera", LINK, "--yes"]) == 0
+    assert page.posted == [
+        ("sign-in", {"token": "abc"}),
+        ("camera/calibrate", None),
+        ("camera/use", {"made_at": 1.8e9}),
+    ]
+    told = capsys.readouterr().out
+    assert "the camera is taken to be where it is drawn" in told and "25 views by board" in told
+
+
+def test_an_idle_robot_is_armed_first(page: PlayedPage) -> None:
+    page.modes[0] = "IDLE"
+    assert main(["calibrate", "camera", LINK, "--yes"]) == 0
+    assert [path for path, _ in page.posted] == ["sign-in", "arm", "camera/calibrate", "camera/use"]
+
+
+def test_without_a_yes_nothing_moves_and_without_a_second_one_the_old_calibration_stays(
+    page: PlayedPage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("builtins.input", lambda _: "n")
+    assert main(["calibrate", "camera", LINK]) == 1
+    assert [path for path, _ in page.posted] == ["sign-in"]
+    answers = iter(("y", ""))
+    monkeypatch.setattr("builtins.input", lambda _: next(answers))
+    assert main(["calibrate", "camera", LINK]) == 1
+    assert "camera/use" not in [path for path, _ in page.posted]
+
+
+def test_a_refused_calibration_says_why_and_is_not_used(page: PlayedPage, capsys: pytest.CaptureFixture[str]) -> None:
+    page.offer, page.refused = None, msgspec.to_builtins(reasons.calibration_few_views(4, 10))
+    assert main(["calibrate", "camera", LINK, "--yes"]) == 1
+    told = capsys.readouterr().out
+    assert reasons.text_of(reasons.calibration_few_views(4, 10)) in told and "stays as it is" in told
+    assert "camera/use" not in [path for path, _ in page.posted]
+
+
+def test_a_pause_leaves_the_old_calibration(page: PlayedPage) -> None:
+    page.modes = ["READY", "AUTO", "PAUSED"]
+    assert main(["calibrate", "camera", LINK, "--yes"]) == 1
+    assert "camera/use" not in [path for path, _ in page.posted]
+
+
+def test_ctrl_c_pauses_the_robot(page: PlayedPage) -> None:
+    page.interrupts = True
+    with pytest.raises(KeyboardInterrupt):
+        main(["calibrate", "camera", LINK, "--yes"])
+    assert page.posted[-1] == ("pause", None)
+
+
+def test_what_the_page_refuses_is_told(page: PlayedPage, capsys: pytest.CaptureFixture[str]) -> None:
+    page.refusal = {"camera/calibrate": 409}
+    assert main(["calibrate", "camera", LINK, "--yes"]) != 0
+    assert "camera/calibrate is told" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("link", ["board", "http://panda.test:8000/", "ftp://panda.test/sign-in?token=abc"])
+def test_a_link_that_signs_nobody_in_is_an_error(link: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["calibrate", "camera", link, "--yes"]) != 0
+    assert "is no sign-in link" in capsys.readouterr().err
+
+
+def test_a_page_that_does_not_answer_is_an_error(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["calibrate", "camera", "http://127.0.0.1:9/sign-in?token=abc", "--yes"]) != 0
+    assert "the page does not answer" in capsys.readouterr().err
