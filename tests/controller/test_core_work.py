@@ -217,8 +217,9 @@ def test_refusals_say_why_and_allowed_agrees_with_them():
     about_points |= {"MoveInQueue", "SetApproach"}
     possible = {name for name, reason in r.state.allowed.items() if reason is None}
     postures = {"SavePosture", "DeletePosture", "CheckPosture"}
-    assert possible == {"Arm", "RequirePreview"} | postures | about_points
+    assert possible == {"Arm", "RequirePreview", "UseCamera"} | postures | about_points
     told = {command.name for command in COMMANDS if command.process == "controller" and command.tag != "control"}
+    told.add("UseCamera")
     assert set(r.state.allowed) == told | {"Teleoperation"}
     assert r.ask(intents.Arm(user="ada")).ok
     assert r.ask(intents.Start(user="ada")).reason == reasons.none_accepted()

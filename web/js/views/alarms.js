@@ -210,7 +210,7 @@ function afterFault({ allowed }) {
 function afterCamera({ code }, controller) {
   if (!code.startsWith("camera_looks_") || !controller) return [];
   if (pageState.get()?.role === "viewer") return [reason("ask_operator")];
-  return [reason(controller.allowed["UseCamera"] === null ? "press_use_calibration" : "pause_then_calibration")];
+  return [controller.allowed["UseCamera"] === null ? reason("press_use_calibration") : reason("pause_then_calibration")];
 }
 
 /** @param {ControllerState["allowed"]} allowed */
