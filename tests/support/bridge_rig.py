@@ -116,17 +116,20 @@ class Rig(Commander):
                 time.sleep(0.004)
 
     def until(self, condition: Callable[[], bool], xi: tuple[float, ...], limit_s: float = 5.0) -> bool:
-        """Run until the condition holds; False when it has not within the limit."""
+        """Run until the condition holds; False when it has not within the limit.
+
+        A busy machine may leave a real robot's bridge without a command for longer than its deadline. Then it wants one
+        at rest first.
+        """
         end = self.time.now + limit_s
         while not condition() and self.time.now < end:
-            self.run(0.02, xi)
+            self.run(0.02, REST if self.state.watchdog else xi)
         return condition()
 
     def drive_on(self) -> None:
         """Come to a steady velocity of base and arm, and see it in the plant."""
         self.run(0.2, REST)
         self.run(1.0, FORWARD)
-        # A real robot's fakes run beside this process; on a busy machine they now and then miss a command.
         assert self.until(lambda: np.allclose(self.plant.velocity(), FORWARD, rtol=0.0, atol=0.06), FORWARD)
 
     def cut(self, cut_id: str, epoch: int | None = None) -> None:
