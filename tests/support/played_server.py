@@ -44,7 +44,7 @@ STILL = (
 COMMAND_NAMES = tuple(command.name for command in COMMANDS if command.process == "controller" or command.modes)
 ALLOWED = {
     "IDLE": ("Arm", "UseCamera"),
-    "READY": ("Start", "Home", "Teleoperation", "UseCamera"),
+    "READY": ("Start", "Home", "Teleoperation", "UseCamera", "CheckCamera", "CalibrateCamera"),
     "AUTO": ("Pause",),
     "TELEOP": ("Pause", "Teleoperation"),
     "PAUSED": ("Resume", "UseCamera"),

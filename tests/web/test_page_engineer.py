@@ -7,12 +7,13 @@ import pytest
 from playwright.sync_api import Locator, Page, expect
 
 from rolling_panda import messages as m
-from tests.support.page_parts import open_screen
-from tests.support.played_page import box_of
-from tests.support.played_server import PlayedServer, bridge, diagnostics
+from rolling_panda.messages.perception import CameraMount, CameraState
+from tests.support.page_parts import open_screen, show_mode
+from tests.support.played_page import box_of, until
+from tests.support.played_server import PlayedServer, bridge, controller, diagnostics
 
 pytestmark = pytest.mark.browser
-USUAL = ["alarms", "processes", "telemetry", "charts", "log", "topics", "models"]
+USUAL = ["alarms", "processes", "telemetry", "charts", "log", "topics", "models", "camera"]
 
 
 def order(page: Page) -> list[str]:
@@ -37,10 +38,10 @@ def test_panels_are_moved_hidden_shown_and_remembered_by_keys_alone(page: Page, 
     expect(show).to_be_focused()
     # What is hidden is passed over.
     tool(page, "topics", "earlier").click()
-    assert order(page) == ["processes", "alarms", "telemetry", "topics", "charts", "models"]
+    assert order(page) == ["processes", "alarms", "telemetry", "topics", "charts", "models", "camera"]
     page.reload()
     expect(page.locator("rp-engineer > section").first).to_be_visible()
-    assert order(page) == ["processes", "alarms", "telemetry", "topics", "charts", "models"]
+    assert order(page) == ["processes", "alarms", "telemetry", "topics", "charts", "models", "camera"]
     page.get_by_role("button", name="Show Log").press("Enter")
     assert "log" in order(page)
     expect(tool(page, "log", "hide")).to_be_focused()
@@ -132,6 +133,30 @@ def test_the_way_of_the_base_is_counted_from_a_press_on_whatever_screen_is_open(
     server.number, server.pose = 0, m.PlanarPose(x=0.0)
     expect(way("x")).to_have_text("0.000 m")
     expect(way("distance")).to_have_text("0.300 m")
+
+
+def test_the_cameras_calibration_is_told_checked_and_taken_from_its_panel(page: Page, server: PlayedServer) -> None:
+    panel = page.locator("rp-calibration")
+    use, row = panel.locator("#use-camera"), lambda name: panel.locator(f'[data-calibration="{name}"]')
+    show_mode(page, server, controller("READY"))
+    open_screen(page, "engineer")
+    expect(row("used")).to_have_text("none: the camera is taken to be where it is drawn")
+    expect(row("seen")).to_contain_text("check the camera")
+    expect(row("offer")).to_have_text("none")
+    expect(use).to_have_attribute("aria-disabled", "true")
+    panel.locator("#check-camera").click()
+    until(page, lambda: [path for path, _ in server.posted] == ["/api/camera/check"])
+    offer = CameraMount(position=(0.0, 0.0, 0.0), quat_xyzw=(0.0, 0.0, 0.0, 1.0), made_at=5.0, source="work", views=9)
+    turned = (math.radians(-0.25), math.radians(0.5), 0.0)
+    server.camera = CameraState(
+        header=m.Header(), offer=offer, turned=turned, turned_sd=(0.001, 0.001, 0.001), observations=12
+    )
+    expect(row("seen")).to_have_text("0.50° to the right, -0.25° up (±\u00a00.06°), from 12 pictures")
+    expect(row("offer")).to_contain_text("from 9 pictures of canes")
+    use.click()
+    until(page, lambda: server.posted[-1] == ("/api/camera/use", {"made_at": 5.0}))
+    show_mode(page, server, controller("AUTO"))
+    expect(use).to_have_attribute("aria-disabled", "true")
 
 
 def test_the_arms_commands_in_time_are_told_of_a_real_robot_alone(page: Page, server: PlayedServer) -> None:

@@ -42,7 +42,7 @@ COLUMNS = (
     *("vine", "done", "not_cut", "unknown", "unreachable", "minutes", "when", "who", "asked", "why", "what", "mean"),
     *("date", "duration", "at_work", "user", "called_wrong", "vines_an_hour", "refused"),
 )
-PANELS = ("alarms", "processes", "telemetry", "charts", "log", "topics", "models")
+PANELS = ("alarms", "processes", "telemetry", "charts", "log", "topics", "models", "camera")
 TOPIC_COLUMNS = ("topic", "sender", "rate", "nominal", "age", "count", "rejected")
 CHOICES = ("part.tool", "part.base", "part.joints", "part.postures", "axes.tool", "axes.base", "axes.world")
 PARTS = {GROUND, *(part_of(shape.name) for shape in robot_geometry(RobotModel()).geometryObjects)}

@@ -13,6 +13,7 @@ import { alarms } from "../js/views/alarms.js";
 import { element, setAttribute, setText } from "../js/views/dom.js";
 import { icon, setIcon } from "../js/views/icons.js";
 import { RpCharts } from "./rp-charts.js";
+import "./rp-calibration.js";
 import "./rp-log.js";
 import "./rp-telemetry.js";
 
@@ -50,6 +51,7 @@ class RpEngineer extends HTMLElement {
       log: [document.createElement("rp-log")],
       topics: [topicTable()],
       models: [modelList()],
+      camera: [document.createElement("rp-calibration")],
     };
     for (const name of PANELS) {
       const panel = this.panel(name, content[name]);

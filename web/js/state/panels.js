@@ -2,12 +2,12 @@
 
 import { signal } from "./signals.js";
 
-/** @typedef {"alarms"|"processes"|"telemetry"|"charts"|"log"|"topics"|"models"} PanelName */
+/** @typedef {"alarms"|"processes"|"telemetry"|"charts"|"log"|"topics"|"models"|"camera"} PanelName */
 /** @typedef {{ order: readonly PanelName[], hidden: readonly PanelName[] }} Arrangement */
 
 const KEY = "rp-panels";
 /** @type {readonly PanelName[]} */
-export const PANELS = Object.freeze(["alarms", "processes", "telemetry", "charts", "log", "topics", "models"]);
+export const PANELS = Object.freeze(["alarms", "processes", "telemetry", "charts", "log", "topics", "models", "camera"]);
 /** @type {Arrangement} */
 const USUAL = Object.freeze({ order: PANELS, hidden: Object.freeze([]) });
 
