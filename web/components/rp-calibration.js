@@ -75,8 +75,9 @@ function turn(angle) {
 
 /** @param {CameraMount} mount */
 function madeWords({ source, made_at, views, pixels, angle_sd, shift_sd }) {
-  const values = { date: dateWords(made_at), sd: turn(angle_sd), shift: decimal(shift_sd * 1000, 1) };
-  return source === "board" ? counted("calibration.board", views, { ...values, pixels: decimal(pixels, 2) }) : counted("calibration.work", views, values);
+  const [date, sd, shift] = [dateWords(made_at), turn(angle_sd), decimal(shift_sd * 1000, 1)];
+  if (source === "board") return counted("calibration.board", views, { date, sd, shift, pixels: decimal(pixels, 2) });
+  return counted("calibration.work", views, { date, sd, shift });
 }
 
 customElements.define("rp-calibration", RpCalibration);
