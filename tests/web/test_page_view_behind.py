@@ -6,6 +6,7 @@ import pytest
 from PIL import Image
 from playwright.sync_api import Frame, Page, expect
 
+from tests.support.page_parts import open_screen
 from tests.support.played_server import ORIGIN, PlayedServer
 
 pytestmark = pytest.mark.browser
@@ -106,3 +107,39 @@ def test_what_is_read_back_is_what_was_drawn(view: Frame) -> None:
       });
     })"""
     assert view.evaluate(read) == [255, 0, 0, 255, 0]
+
+
+def frames_in(view: Frame, milliseconds: int) -> int:
+    before = view.evaluate("client.frames")
+    view.page.wait_for_timeout(milliseconds)
+    return int(view.evaluate("client.frames")) - int(before)
+
+
+@pytest.mark.alone  # It counts frames in a time.
+def test_behind_another_screen_the_view_draws_once_a_second_and_goes_on_when_it_is_seen(view: Frame) -> None:
+    view.evaluate(CLIENT)
+    until_shown(view, RED, BLUE)
+    assert frames_in(view, 2000) >= 10
+    open_screen(view.page, "report")
+    view.page.wait_for_timeout(200)
+    assert 1 <= frames_in(view, 3000) <= 4
+    open_screen(view.page, "work")
+    view.page.wait_for_timeout(1100)
+    assert frames_in(view, 2000) >= 10
+
+
+@pytest.mark.alone  # It counts frames in a time.
+def test_slow_frames_leave_as_much_time_to_the_robot_as_they_take(view: Frame) -> None:
+    view.evaluate(CLIENT)
+    until_shown(view, RED, BLUE)
+    view.evaluate("""() => {
+      const { gl } = client, { getSyncParameter } = gl;
+      const finished = new WeakMap();
+      gl.getSyncParameter = (sync, name) => {
+        if (!finished.has(sync)) finished.set(sync, performance.now() + 200);
+        return performance.now() < finished.get(sync) ? gl.UNSIGNALED : getSyncParameter.call(gl, sync, name);
+      };
+    }""")
+    view.page.wait_for_timeout(500)
+    # One each 0.4 s, and not each 0.2 s.
+    assert 6 <= frames_in(view, 4000) <= 11

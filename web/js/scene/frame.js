@@ -40,8 +40,12 @@ const reportWhenDrawn = (nextFrame, shown) => {
 const LARGEST_RATIO = 1.5;
 /** The same without a graphics card. Below this the canes become dashes. */
 const LARGEST_RATIO_IN_SOFTWARE = 1;
-/** Frame period in software (ms). The page's buttons share the thread. */
+/** Shortest frame period in software (ms). The page's buttons share the thread. */
 const PACE_IN_SOFTWARE = 80;
+/** Frame period in software behind a screen that hides the view (ms). The client needs frames to read its messages. */
+const PACE_HIDDEN = 1000;
+/** After a frame the processor is left to the robot for as long as the frame took, this at most (ms). */
+const LONGEST_REST = 250;
 
 const plainContext = HTMLCanvasElement.prototype.getContext;
 const plainRequest = window.requestAnimationFrame.bind(window);
@@ -86,28 +90,37 @@ if (inSoftware) {
     return gl;
   };
   HTMLCanvasElement.prototype.getContext = /** @type {any} */ (getContext);
-  paceFrames(PACE_IN_SOFTWARE);
+  paceFrames();
 }
 
-/**
- * Limit the frame rate and never overlap frames, so that presses are handled in between.
- *
- * @param {number} pace In ms.
- */
-function paceFrames(pace) {
+/** Is the view hidden behind another screen of the page? */
+function hidden() {
+  const place = window.frameElement;
+  return place !== null && getComputedStyle(place).visibility === "hidden";
+}
+
+/** Limit the frame rate and never overlap frames, so that presses are handled in between. */
+function paceFrames() {
   /** @type {Map<number, FrameRequestCallback>} */
   const waiting = new Map();
   let issued = 0;
   let planned = false;
-  let drawn = -pace;
+  let began = 0;
+  let took = 0;
   const plan = () => {
     if (planned || behind.some((each) => each.busy) || waiting.size === 0) return;
     planned = true;
-    window.setTimeout(() => plainRequest(draw), Math.max(0, drawn + pace - performance.now()));
+    const pace = hidden() ? PACE_HIDDEN : Math.max(PACE_IN_SOFTWARE, took + Math.min(took, LONGEST_REST));
+    window.setTimeout(() => plainRequest(draw), Math.max(0, began + pace - performance.now()));
+  };
+  const shown = () => {
+    took = performance.now() - began;
+    plan();
   };
   /** @param {number} now */
   const draw = (now) => {
-    drawn = performance.now();
+    began = performance.now();
+    took = 0;
     for (const number of [...waiting.keys()]) {
       const callback = waiting.get(number);
       waiting.delete(number);
@@ -117,7 +130,7 @@ function paceFrames(pace) {
         window.reportError(error);
       }
     }
-    for (const each of behind) each.finish(plainRequest, plan);
+    for (const each of behind) each.finish(plainRequest, shown);
     // Frames requested meanwhile wait until this one is shown.
     planned = false;
     plan();
