@@ -1538,12 +1538,12 @@ def bridge_state_set_aside(path: str) -> None:
 
 @_reason("info", "")
 def past_node(distance_mm: float, node: float) -> None:
-    """{distance_mm:.0f} mm past node {node:.0f}, so that {node:.0f} {node:node|nodes} and the basal bud stay."""
+    """{distance_mm:.0f} mm past bud {node:.0f}, so that {node:.0f} {node:bud|buds} and the basal bud stay."""
 
 
 @_reason("info", "")
 def midway_past_node(distance_mm: float, node: float) -> None:
-    """{distance_mm:.0f} mm past node {node:.0f}, midway on: {node:.0f} {node:node|nodes} and the basal bud stay."""
+    """{distance_mm:.0f} mm past bud {node:.0f}, midway on: {node:.0f} {node:bud|buds} and the basal bud stay."""
 
 
 @_reason("info", "")
@@ -1563,12 +1563,12 @@ def spur_cut_thickest(canes: float, diameter_mm: float, place: Reason) -> None:
 
 @_reason("info", "")
 def guyot_cut_lower(distance_mm: float, node: float) -> None:
-    """Guyot, on the lower of two canes, the next spur: {distance_mm:.0f} mm past node {node:.0f}."""
+    """Guyot, on the lower of two canes, the next spur: {distance_mm:.0f} mm past bud {node:.0f}."""
 
 
 @_reason("info", "")
 def guyot_cut_upper(distance_mm: float, node: float) -> None:
-    """Guyot, on the upper of two canes, which will fruit: {distance_mm:.0f} mm past node {node:.0f}."""
+    """Guyot, on the upper of two canes, which will fruit: {distance_mm:.0f} mm past bud {node:.0f}."""
 
 
 @_reason("info", "")
@@ -1578,22 +1578,22 @@ def renewal_cut(others: float) -> None:
 
 @_reason("info", "")
 def placed_past_node(user: str, distance_mm: float, node: float) -> None:
-    """Placed by {user}: {distance_mm:.0f} mm past node {node:.0f} on this cane."""
+    """Placed by {user}: {distance_mm:.0f} mm past bud {node:.0f} on this cane."""
 
 
 @_reason("info", "")
 def placed_below_nodes(user: str) -> None:
-    """Placed by {user}: below the first node on this cane."""
+    """Placed by {user}: below the first bud on this cane."""
 
 
 @_reason("info", "")
 def moved_past_node(user: str, distance_mm: float, node: float) -> None:
-    """Moved by {user}: {distance_mm:.0f} mm past node {node:.0f} on this cane."""
+    """Moved by {user}: {distance_mm:.0f} mm past bud {node:.0f} on this cane."""
 
 
 @_reason("info", "")
 def moved_below_nodes(user: str) -> None:
-    """Moved by {user}: below the first node on this cane."""
+    """Moved by {user}: below the first bud on this cane."""
 
 
 # Perception: undecided sites
@@ -1631,22 +1631,22 @@ def canes_equally_thin() -> None:
 
 @_reason("info", "")
 def cane_base_hidden() -> None:
-    """The base of the cane to keep is hidden, so its nodes cannot be counted from the first."""
+    """The base of the cane to keep is hidden, so its buds cannot be counted from the first."""
 
 
 @_reason("info", "")
 def nodes_lacking(seen: float, needed: float) -> None:
-    """Only {seen:.0f} of {needed:.0f} nodes seen on the cane to keep; never guessed."""
+    """Only {seen:.0f} of {needed:.0f} buds seen on the cane to keep; never guessed."""
 
 
 @_reason("info", "")
 def pruned_already(distance_mm: float, node: float) -> None:
-    """The cane ends {distance_mm:.0f} mm past node {node:.0f}: it is pruned already."""
+    """The cane ends {distance_mm:.0f} mm past bud {node:.0f}: it is pruned already."""
 
 
 @_reason("info", "")
 def beyond_node_hidden(node: float) -> None:
-    """What lies beyond node {node:.0f} is not in view."""
+    """What lies beyond bud {node:.0f} is not in view."""
 
 
 @_reason("info", "")
@@ -1656,17 +1656,17 @@ def cut_place_hidden() -> None:
 
 @_reason("info", "")
 def node_may_be_hidden() -> None:
-    """A stretch of the cane to keep is hidden where another node may be."""
+    """A stretch of the cane to keep is hidden where another bud may be."""
 
 
 @_reason("info", "")
 def nodes_side_by_side() -> None:
-    """Two nodes seem to sit side by side, so one may belong to another cane."""
+    """Two buds seem to sit side by side, so one may belong to another cane."""
 
 
 @_reason("info", "")
 def nodes_far_apart() -> None:
-    """Two nodes are so far apart that one between them may not have been seen."""
+    """Two buds are so far apart that one between them may not have been seen."""
 
 
 @_reason("info", "")
@@ -1676,7 +1676,7 @@ def cane_crosses_cut() -> None:
 
 @_reason("info", "")
 def blades_without_place() -> None:
-    """No place for the blades between two nodes."""
+    """No place for the blades between two buds."""
 
 
 @_reason("info", "")
@@ -1829,7 +1829,7 @@ def cane_begins_there() -> None:
 
 @_reason("warning", "")
 def node_too_near(distance_mm: float, needed_mm: float) -> None:
-    """{distance_mm:.0f} mm from a node: the blades need {needed_mm:.0f} mm."""
+    """{distance_mm:.0f} mm from a bud: the blades need {needed_mm:.0f} mm."""
 
 
 @_reason("warning", "")
@@ -1937,17 +1937,17 @@ def which_cane_unclear(distance_mm: float) -> None:
 
 @_reason("info", "")
 def node_unseen_in_shifted_picture(distance_mm: float) -> None:
-    """The picture is shifted by {distance_mm:.0f} mm, and the node before the cut was not seen."""
+    """The picture is shifted by {distance_mm:.0f} mm, and the bud before the cut was not seen."""
 
 
 @_reason("info", "")
 def node_near_cut(distance_mm: float) -> None:
-    """A node is seen {distance_mm:.0f} mm from the cut."""
+    """A bud is seen {distance_mm:.0f} mm from the cut."""
 
 
 @_reason("info", "")
 def node_before_cut_unseen() -> None:
-    """The node before the cut was not seen."""
+    """The bud before the cut was not seen."""
 
 
 @_reason("warning", "")
@@ -2225,7 +2225,7 @@ def other_cane() -> None:
 
 @_reason("warning", "")
 def other_nodes_kept(before: float, now: float) -> None:
-    """It left {before:.0f} {before:node|nodes} when it was accepted, and leaves {now:.0f} now."""
+    """It left {before:.0f} {before:bud|buds} when it was accepted, and leaves {now:.0f} now."""
 
 
 @_reason("info", "")
@@ -2255,12 +2255,12 @@ def rule_wants_no_cut(rule: Reason) -> None:
 
 @_reason("info", "")
 def spur_rule(nodes: float, diameter_mm: float, past_mm: float) -> None:
-    """Spur, nodes kept: {nodes:.0f}, from {diameter_mm:g} mm, {past_mm:.0f} mm past the last node."""
+    """Spur, buds kept: {nodes:.0f}, from {diameter_mm:g} mm, {past_mm:.0f} mm past the last bud."""
 
 
 @_reason("info", "")
 def guyot_rule(nodes: float, fruiting: float, diameter_mm: float, past_mm: float) -> None:
-    """Guyot, nodes kept: {nodes:.0f} + {fruiting:.0f}, from {diameter_mm:g} mm, {past_mm:.0f} mm past the last node."""
+    """Guyot, buds kept: {nodes:.0f} + {fruiting:.0f}, from {diameter_mm:g} mm, {past_mm:.0f} mm past the last bud."""
 
 
 @_reason("warning", "accept again what is to be cut")

@@ -252,7 +252,7 @@ def test_a_point_that_becomes_another_cut_before_the_blades_is_not_cut():
     assert entry(r, "a").state == "PROPOSED"
     assert entry(r, "a").reason == reasons.acceptance_void(reasons.other_nodes_kept(2, 3))
     assert [point_id for point_id, _ in r.cuts] == ["b"]
-    assert any("a was left: The acceptance is void: It left 2 nodes" in text for text in r.events)
+    assert any("a was left: The acceptance is void: It left 2 buds" in text for text in r.events)
     assert_limits_kept(r)
 
 
@@ -267,7 +267,7 @@ def test_a_rule_that_is_taken_back_brings_its_acceptances_and_the_log_says_so():
     r.show((low,), short)
     r.run(0.1)
     assert entry(r, "a").state == "PROPOSED" and "cuts 50 mm away" in text_of(entry(r, "a").reason)
-    assert any("a: The acceptance is void: The rule is now: Spur, nodes kept: 1" in text for text in r.events)
+    assert any("a: The acceptance is void: The rule is now: Spur, buds kept: 1" in text for text in r.events)
     assert r.ask(intents.RestoreAccepted(user="eve", rule=usual)).reason == reasons.nothing_to_restore()
     assert r.ask(intents.RestoreAccepted(user="eve", rule=short)).ok
     r.show((high,), usual)

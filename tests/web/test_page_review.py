@@ -64,7 +64,7 @@ def test_the_first_cut_to_decide_is_pictured_with_what_falls_and_what_stays(page
     expect(review.locator(".review-count")).to_have_text("1 of 6")
     expect(review.locator("h2")).to_have_text("Vine 1 · spur 1")
     expect(review.locator(".review-keeps")).to_have_text("Spur cut · keeps 2 buds · sure")
-    expect(review.locator(".review-why")).to_contain_text("20 mm past node 2")
+    expect(review.locator(".review-why")).to_contain_text("20 mm past bud 2")
     picture = review.locator("rp-cut-picture")
     assert box_of(picture)["width"] >= 320 and box_of(picture)["height"] >= 240
     # The cane goes up: what is above the cut falls, the two nodes below it stay.
@@ -434,10 +434,10 @@ def test_a_cut_is_dragged_along_its_cane_and_put_back_where_that_is_refused(page
     expect(page.locator(".picture-moved")).to_be_hidden()
     page.locator("#undo").click()
     until(page, lambda: server.posted[-1] == ("/api/points/p1/move", {"along": -0.012}))
-    server.answers["/api/points/p1/move"] = (409, {"ok": False, "reason": "4 mm from a node: the blades need 10 mm"})
+    server.answers["/api/points/p1/move"] = (409, {"ok": False, "reason": "4 mm from a bud: the blades need 10 mm"})
     drag(-4)
     page.mouse.up()
-    expect(page.locator(".toast").last).to_contain_text("4 mm from a node")
+    expect(page.locator(".toast").last).to_contain_text("4 mm from a bud")
     expect(page.locator(".picture-moved")).to_be_hidden()
     assert box_of(review.locator(".blade .tips"))["y"] == pytest.approx(before["y"], abs=1.0)
     assert server.state_of("p1") == "PROPOSED" and len(server.posted) == 3
@@ -450,7 +450,7 @@ def test_a_point_is_moved_by_millimetres_and_an_accepted_one_is_not(page: Page, 
     until(page, lambda: ("/api/points/p1/move", {"along": 0.005}) in server.posted)
     page.locator("#undo").click()
     until(page, lambda: ("/api/points/p1/move", {"along": -0.005}) in server.posted)
-    for words in ("Spur cut, 20 mm past node 2", "8.0 mm, ≈ 470 N", "± 3.0 mm, ± 2°", "wire 141 · cordon 62"):
+    for words in ("Spur cut, 20 mm past bud 2", "8.0 mm, ≈ 470 N", "± 3.0 mm, ± 2°", "wire 141 · cordon 62"):
         expect(page.locator("rp-adjust")).to_contain_text(words)
     mark(page, "p2").click()
     looking_at(page, "p2")
