@@ -200,6 +200,17 @@ def test_on_a_telephone_a_screen_has_one_scroller(page: Page, server: PlayedServ
     assert page.evaluate(scrollers) == ["rp-work"]
 
 
+def test_on_a_telephone_the_controls_that_drive_are_in_sight(page: Page, server: PlayedServer) -> None:
+    page.set_viewport_size({"width": 390, "height": 844})
+    for state, needed in {"base": "#drive-pad", "tool": ".arrows button", "joints": ".joint button"}.items():
+        STATES[f"teleoperate-{state}"](page, server)
+        screen, control = box_of(page.locator("rp-drive")), box_of(page.locator(needed).first)
+        foot = page.locator(".drive-foot")
+        end = box_of(foot)["y"] if foot.is_visible() else screen["y"] + screen["height"]
+        assert screen["y"] <= control["y"] and control["y"] + control["height"] <= end, state
+        assert view_share(page, 390, 844) >= 0.28
+
+
 def test_large_letters_and_large_targets_where_somebody_works(page: Page, server: PlayedServer) -> None:
     STATES["alarms"](page, server)
     parts = "rp-work, rp-bar, rp-alarms, rp-screens"

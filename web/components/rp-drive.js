@@ -42,7 +42,7 @@ class RpDrive extends HTMLElement {
       "button",
       { id: "hold", attributes: { "aria-keyshortcuts": "H" } },
       holdWords,
-      element("kbd", { text: "H" }),
+      element("kbd", { class: "keyboard", text: "H" }),
     );
     holdButton(
       button,
