@@ -15,6 +15,10 @@ BENCHMARKS = {
     "world": ("benchmarks.control.world", "the same in a rough world: calibration, ground, wind, light, blades"),
     "reach": ("benchmarks.control.reach", "tool poses anywhere around the robot: reached, limits, manipulability"),
     "arm": ("benchmarks.control.arm", "the arm alone between random poses, beside published figures"),
+    "contact": (
+        "benchmarks.control.contact",
+        "the arm against posts, wires and wood: forces, time to rest, false stops",
+    ),
     "page": ("benchmarks.page.latency", "the page in a real browser: hand to robot, robot to screen, with viewers"),
     "attacks": ("benchmarks.page.attacks", "the software stop while slow and flooding clients attack the server"),
     "load": ("benchmarks.page.load", "processor, memory and traffic of the demo"),

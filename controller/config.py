@@ -234,6 +234,24 @@ class SupervisionConfig(Struct, frozen=True, forbid_unknown_fields=True):
     obstacles_max_age_s: Annotated[float, at_most(10.0)] = 6.0
 
 
+class ContactConfig(Struct, frozen=True, forbid_unknown_fields=True):
+    """Limits of what the arm feels, and the reaction. docs/safety.md has the sources.
+
+    Attributes:
+        light_force: Force at the tool from which a push is told (N). Canes may be pushed.
+        stop_force: Force at the tool that stops the robot (N).
+        stop_torque: External torque of one of the joints 1 to 4 that stops the robot (N·m).
+        stop_torque_wrist: The same of the joints 5 to 7.
+        back_off: Distance that the tool goes back on its way after a contact (m).
+    """
+
+    light_force: Annotated[float, at_most(20.0)] = 8.0
+    stop_force: Annotated[float, at_most(30.0)] = 25.0
+    stop_torque: Annotated[float, at_most(20.0)] = 12.0
+    stop_torque_wrist: Annotated[float, at_most(10.0)] = 5.0
+    back_off: Annotated[float, within(0.0, 0.2, or_zero=True)] = 0.05
+
+
 class TeleoperationConfig(Struct, frozen=True, forbid_unknown_fields=True):
     """Parameters of teleoperation.
 
@@ -267,6 +285,7 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
         motion: Parameters of the motions that the robot follows.
         work: Parameters of the automatic work.
         supervision: Age limits.
+        contact: Limits of what the arm feels.
         teleoperation: Parameters of teleoperation.
     """
 
@@ -276,6 +295,7 @@ class ControllerConfig(Struct, frozen=True, forbid_unknown_fields=True):
     motion: MotionConfig = MotionConfig()
     work: WorkConfig = WorkConfig()
     supervision: SupervisionConfig = SupervisionConfig()
+    contact: ContactConfig = ContactConfig()
     teleoperation: TeleoperationConfig = TeleoperationConfig()
 
     @property

@@ -23,6 +23,7 @@ from controller.ledger.journal import (
     RequestRow,
     TicketRow,
 )
+from controller.motion.contact import ContactMonitor
 from controller.motion.follower import Tracking
 from controller.planning.plan_manager import PlanManager
 from controller.planning.preview import PreviewManager
@@ -122,6 +123,11 @@ class Controller:
     def tracking(self) -> Tracking | None:
         """Tracking of the last step's motion; None without a motion."""
         return self._movement.tracking
+
+    @property
+    def contact(self) -> ContactMonitor:
+        """What the arm feels."""
+        return self._movement.body.contact
 
     def restore(
         self,
@@ -427,5 +433,6 @@ class Controller:
             interrupted=self._supervisor.interrupted,
             relaxed_limits=self._relaxed_limits,
             postures=self._postures.all,
+            tool_force=movement.body.contact.force,
             now=now,
         )

@@ -31,6 +31,7 @@ def controller_state(
     interrupted: m.Interrupted,
     relaxed_limits: tuple[m.Reason, ...],
     postures: tuple[SavedPosture, ...],
+    tool_force: float | None,
     now: float,
 ) -> m.ControllerState:
     """The message of the controller's state.
@@ -51,6 +52,7 @@ def controller_state(
         interrupted: Activity that a pause or a protective stop interrupted.
         relaxed_limits: Safety limits that the configuration sets less strictly than usual.
         postures: Postures that the arm can be led to.
+        tool_force: Force at the tool (N); None if the arm estimates none.
         now: Monotonic time (s).
     """
     omega = 0.0
@@ -86,6 +88,7 @@ def controller_state(
         interrupted=interrupted,
         relaxed_limits=relaxed_limits,
         postures=postures,
+        tool_force=tool_force,
     )
 
 

@@ -63,7 +63,7 @@ class Row:
     when: str = ""
 
 
-_PROTECT = "limit violated, data stale, connection lost, or tracking error too large"
+_PROTECT = "limit violated, contact felt, data stale, connection lost, or tracking error too large"
 _CLEAR = "the cause has been gone for 1 s"
 
 ROWS: Final[tuple[Row, ...]] = (

@@ -2589,6 +2589,36 @@ def retreat_by_joints(point: str, why: Reason) -> None:
     """{point}: the straight way back failed, the arm now retreats by its joints: {why}."""
 
 
+@_reason("error", "look at both places before you go on")
+def touched(part: str, other: str, force_n: float) -> None:
+    """Contact with about {force_n:.0f} N: {part}, and probably {other}."""
+
+
+@_reason("error", "look what it was before you go on")
+def touched_unknown(part: str, force_n: float) -> None:
+    """Contact with about {force_n:.0f} N: {part}, and something that the robot does not know."""
+
+
+@_reason("info", "")
+def backed_off() -> None:
+    """After the contact the robot has gone back a little on its way."""
+
+
+@_reason("warning", "look whether the robot is caught")
+def not_backed_off() -> None:
+    """After the contact the robot could not go back on its way."""
+
+
+@_reason("error", "check the arm's connection and its control box")
+def touch_unfelt() -> None:
+    """The arm no longer reports external torques: no contact would be felt."""
+
+
+@_reason("warning", "stay near the stop button")
+def touch_never_felt() -> None:
+    """The arm reports no external torques: contacts do not stop the robot."""
+
+
 @_reason("error", "check the brakes, the drive and what may hold the robot")
 def tracking_error(part: str, error_rad: float, limit_rad: float) -> None:
     """The robot does not follow: {part} is {error_rad:.2f} rad from its command; the limit is {limit_rad:.2f} rad."""

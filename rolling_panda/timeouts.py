@@ -1,6 +1,6 @@
-"""Related time limits of all processes in one table, and the relations that have to hold between them.
+"""Related limits of all processes in one table, most of them times, and the relations that have to hold between them.
 
-A time limit is a key of the configuration or a constant of the program. Each process checks the relations at its start,
+A limit is a key of the configuration or a constant of the program. Each process checks the relations at its start,
 over all sections of its configuration, since a limit of one process may depend on that of another.
 """
 
@@ -16,19 +16,21 @@ from rolling_panda.errors import ConfigError
 
 @dataclass(frozen=True)
 class Limit:
-    """A time limit, or a period (s).
+    """A time limit, or a period (s); or another limit with its unit.
 
     Attributes:
         name: Of a key of the configuration its path, `SECTION.KEY`; of a constant a name of its own.
         usual: Default of the key, or value of the constant; of a rate in Hz.
         source: Where a constant stands in the program: `FILE:NAME`; empty for a key of the configuration.
         rate: Whether the key is a rate (Hz); the limit is its period.
+        unit: Of the limit.
     """
 
     name: str
     usual: float
     source: str = ""
     rate: bool = False
+    unit: str = "s"
 
     @property
     def configurable(self) -> bool:
@@ -41,7 +43,7 @@ class Limit:
         return f"1/{self.name}" if self.rate else self.name
 
     def seconds(self, value: float) -> float:
-        """The limit (s) with this value of the key."""
+        """The limit (s, or its own unit) with this value of the key."""
         return 1.0 / value if self.rate else value
 
 
@@ -109,6 +111,12 @@ _ALL: Final = (
     Limit("controller.supervision.ledger_max_age_s", 0.6),
     Limit("controller.supervision.obstacles_max_age_s", 6.0),
     Limit("controller.teleoperation.hold_max_age_s", 0.15),
+    # What the arm feels, and what stops it in its control box.
+    Limit("controller.contact.light_force", 8.0, unit="N"),
+    Limit("controller.contact.stop_force", 25.0, unit="N"),
+    Limit("controller.contact.stop_torque", 12.0, unit="N·m"),
+    Limit("real.arm.contact_force", 30.0, unit="N"),
+    Limit("real.arm.contact_torque", 20.0, unit="N·m"),
     Limit("controller.work.cut_timeout_s", 3.0),
     Limit("controller.work.close_up_timeout_s", 8.0),
     Limit("lost close-up", 1.5, "controller/work/close_up.py:_LOST_S"),
@@ -266,6 +274,24 @@ RELATIONS: Final = (
         times=2,
     ),
     Relation(
+        "controller.contact.light_force",
+        "controller.contact.stop_force",
+        "a push is told before it stops the robot",
+        strict=True,
+    ),
+    Relation(
+        "controller.contact.stop_force",
+        "real.arm.contact_force",
+        "the robot stops and goes back before the arm's control box stops it for good",
+        strict=True,
+    ),
+    Relation(
+        "controller.contact.stop_torque",
+        "real.arm.contact_torque",
+        "the robot stops and goes back before the arm's control box stops it for good",
+        strict=True,
+    ),
+    Relation(
         "bridge.camera_resting_hz",
         "controller.supervision.obstacles_max_age_s",
         "one frame of the resting camera may be lost",
@@ -314,7 +340,7 @@ def check(path: Path) -> None:
 
 
 def _told(limit: Limit, values: Mapping[str, float]) -> str:
-    return f"{limit.name} is {values[limit.name]:.4g}{' Hz' if limit.rate else ' s'}"
+    return f"{limit.name} is {values[limit.name]:.4g}{' Hz' if limit.rate else f' {limit.unit}'}"
 
 
 def _lower(limit: Limit) -> str:

@@ -34,6 +34,7 @@ DISTURBANCES: dict[str, tuple[str, ...]] = {
     "wind": ("sway",),
     "lost depth": ("depth_lost",),
     "blades": ("blade_failures",),
+    "elastic canes": ("cane_modulus",),
     "hanging canes": ("hanging",),
 }
 

@@ -27,7 +27,7 @@ from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.messages.supervision import StopState
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import Limits
-from rolling_panda.model.wire_values import actuated
+from rolling_panda.model.wire_values import actuated, arm_torques
 from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.topics import BRIDGE, CLOSE_UP_REQUEST, CUT, MOTION, ODOMETRY, TOKEN
 from rolling_panda.transport.rejections import Rejections
@@ -45,6 +45,8 @@ _STANDSTILL_S = 0.05
 # Modes of the holder in which nothing moves, except for braking, and the time limit of braking (s).
 _STILL: tuple[m.Mode, ...] = ("IDLE", "FAULT", "ESTOP_LATCHED")
 _BRAKING_S = 0.3
+# Largest external torque that is told (N·m), far beyond what a joint bears.
+_MOST_TORQUE = 1000.0
 # Speed above which the camera uses its moving rate (rad/s).
 _MOVING = 0.01
 
@@ -358,11 +360,17 @@ class BridgeCore:
         )
 
     def _joint_state(self, now: float) -> m.JointState:
+        torque = self._measured.external_torque
+        # One value that is no number would have the whole joint state refused.
+        felt = None
+        if torque is not None and np.isfinite(torque).all():
+            felt = arm_torques(np.clip(torque, -_MOST_TORQUE, _MOST_TORQUE))
         return m.JointState(
             header=m.Header(now),
             sequence=self._ticks // self._joint_ticks,
             position=actuated(self._measured.position),
             velocity=actuated(self._measured.velocity),
+            external_torque=felt,
         )
 
     def _state(self, now: float) -> m.BridgeState:

@@ -19,6 +19,7 @@ class Measurement:
 
     `detail` explains `outcome`; it is `NO_CUT` before the first cut. `fault` is the reason why the robot cannot move,
     None without one. A person has to release a `severe` fault.
+    `external_torque` is the arm's own estimate of the torques by what touches it (7, N·m); None without one.
     `emergency` tells whether the emergency stop button is pressed. `battery` is the charge (0…1), and `arm_success` the
     fraction of the arm's last 100 commands that arrived in time; None if unknown.
     """
@@ -34,6 +35,7 @@ class Measurement:
     emergency: bool = False
     battery: float | None = None
     arm_success: float | None = None
+    external_torque: Array | None = None
 
 
 @dataclass(frozen=True)

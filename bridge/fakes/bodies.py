@@ -27,6 +27,10 @@ class ArmBody(Protocol):
     def dq(self) -> Array:
         """Measured velocities (7, rad/s)."""
 
+    @property
+    def external_torque(self) -> Array:
+        """Estimated torques by what touches the arm (7, N·m)."""
+
     def move(self, velocity: Array) -> None:
         """Advance by a millisecond with commanded velocities (7, rad/s)."""
 
@@ -71,6 +75,7 @@ class IdealArm:
         """At rest in the start posture."""
         self.q: Array = START.copy()
         self.dq: Array = np.zeros(7)
+        self.external_torque: Array = np.zeros(7)
 
     def move(self, velocity: Array) -> None:
         """Advance with constant acceleration to the new velocity."""

@@ -114,6 +114,7 @@ class ControlBox:
         self._worst = np.zeros(3)
         self._violations: list[str] = []
         self._load = 0.0
+        self._push = np.zeros(7)
         self._standstill_since: float | None = None
         self._moved = 0
         self._client: socket.socket | None = None
@@ -141,7 +142,7 @@ class ControlBox:
             time.sleep(max(0.0, due - now))
 
     def tell(self, words: list[str]) -> None:
-        """Trigger a collision, press or release the user stop, drop consecutive packets, or reset the monitor.
+        """Trigger a collision, push joints, press or release the user stop, drop packets in a row, reset the monitor.
 
         A series of drops starts only after a command that was received.
         """
@@ -149,6 +150,8 @@ class ControlBox:
             match words:
                 case ["collide"]:
                     self._reflex(p.JOINT_REFLEX, "collision")
+                case ["push", *torques]:
+                    self._push = np.array(torques, float)
                 case ["press"]:
                     self._press()
                 case ["free"]:
@@ -273,6 +276,7 @@ class ControlBox:
         command = self._receive() if moving and target is not None else None
         with self._lock:
             state.q, state.dq = self._body.q, self._body.dq
+            state.external_torque = self._body.external_torque + self._push
             if moving and state.mode == p.MOVING:
                 self._follow(command)
             if float(np.abs(state.dq_d).max()) >= _STANDSTILL:

@@ -27,10 +27,11 @@ JOINT_IMPEDANCE, OTHER_CONTROLLER = 0, 3
 POSITION_LIMIT, JOINT_REFLEX, VELOCITY_LIMIT, VELOCITY_STEP, ACCELERATION_STEP, COMMUNICATION = 0, 6, 13, 14, 15, 25
 ERRORS = 41
 
-# Fields of the state before and after the joint angles, as numbers of doubles.
+# Fields of the state before, between and after torques, joint angles and external torques, as numbers of doubles.
 _BEFORE_TAU = 6 * 16 + 1 + 9 + 3 + 1 + 9 + 3 + 2 + 2
-_AFTER_DDQ = 7 + 6 + 7 + 6 + 7 + 6 + 6 + 6 + 3 + 2 + 2 + 2 + 16 + 6 + 6
-_STATE = struct.Struct(f"<Q{_BEFORE_TAU}d21d35d{_AFTER_DDQ}d14dBB{ERRORS}s{ERRORS}sBd")
+_BEFORE_EXTERNAL = 7 + 6 + 7 + 6
+_AFTER_EXTERNAL = 6 + 6 + 6 + 3 + 2 + 2 + 2 + 16 + 6 + 6
+_STATE = struct.Struct(f"<Q{_BEFORE_TAU}d21d35d{_BEFORE_EXTERNAL}d7d{_AFTER_EXTERNAL}d14dBB{ERRORS}s{ERRORS}sBd")
 # message id; q, dq, pose, twist, elbow; elbow valid; finished; torques
 COMMAND = struct.Struct("<Q7d7d16d6d2d??7d")
 # Indices in it.
@@ -48,6 +49,7 @@ class State:
     dq: Joints = field(default_factory=lambda: np.zeros(7))
     dq_d: Joints = field(default_factory=lambda: np.zeros(7))
     ddq_d: Joints = field(default_factory=lambda: np.zeros(7))
+    external_torque: Joints = field(default_factory=lambda: np.zeros(7))
     mode: int = IDLE
     errors: frozenset[int] = frozenset()
     reflex: frozenset[int] = frozenset()
@@ -69,7 +71,9 @@ class State:
             *dq,
             *dq_d,
             *ddq_d,
-            *[0.0] * _AFTER_DDQ,
+            *[0.0] * _BEFORE_EXTERNAL,
+            *self.external_torque.tolist(),
+            *[0.0] * _AFTER_EXTERNAL,
             *q,
             *dq,
             GENERATOR_JOINT_VELOCITY if moving else GENERATOR_IDLE,

@@ -56,6 +56,12 @@ class VineyardPlant:
         return self._measured.velocity[2:]
 
     @property
+    def external_torque(self) -> Array:
+        """Of the arm, as it estimates it (7, N·m)."""
+        torque = self._measured.external_torque
+        return np.zeros(7) if torque is None else torque
+
+    @property
     def turned(self) -> Array:
         """Of the wheels (2, rad)."""
         return self._measured.position[:2]

@@ -47,6 +47,7 @@ class ArmState:
         severe: Whether a person has to release the fault.
         success_rate: Fraction of the last 100 commands that arrived in time.
         commands: Number of commands since the start.
+        external_torque: libfranka's `tau_ext_hat_filtered` (7, N·m), less gravity, motion and the load of `set_load`.
     """
 
     at: float
@@ -56,6 +57,7 @@ class ArmState:
     severe: bool
     success_rate: float
     commands: int
+    external_torque: Array
 
 
 @dataclass(frozen=True)
@@ -102,7 +104,7 @@ class ArmLink:
     def __init__(self, context: SpawnContext) -> None:
         """Empty."""
         self._down = SharedNote(context, 10)
-        self._up = SharedNote(context, 18)
+        self._up = SharedNote(context, 25)
 
     def command(self, at: float, velocity: Array, releases: int, closing: bool) -> None:
         """The bridge's side: replace the target."""
@@ -118,13 +120,17 @@ class ArmLink:
         """The arm's side: replace the state."""
         numbers = [state.severe, state.success_rate, state.commands]
         fault = b"" if state.fault is None else msgspec.json.encode(state.fault)
-        self._up.write(np.concatenate([[state.at], state.position, state.velocity, numbers]), fault)
+        self._up.write(
+            np.concatenate([[state.at], state.position, state.velocity, numbers, state.external_torque]), fault
+        )
 
     def state(self) -> ArmState:
         """The bridge's side: the newest state; `at` is 0 before the first."""
         note = self._up.read()
         v = note.values
-        return ArmState(float(v[0]), v[1:8], v[8:15], _fault(note.words), bool(v[15]), float(v[16]), int(v[17]))
+        return ArmState(
+            float(v[0]), v[1:8], v[8:15], _fault(note.words), bool(v[15]), float(v[16]), int(v[17]), v[18:25]
+        )
 
 
 def _fault(words: bytes) -> Reason | None:

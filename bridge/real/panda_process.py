@@ -56,7 +56,7 @@ class _Session:
     def __init__(self, config: ArmConfig, limits: Limits, link: ArmLink, moving: bool, parent: int) -> None:
         self._config, self._link, self._moving, self._parent = config, link, moving, parent
         self._follower = ArmFollower(limits, config.joint_margin, config.fade_s, config.deadline_s)
-        self._position, self._velocity = np.zeros(7), np.zeros(7)
+        self._position, self._velocity, self._external_torque = np.zeros(7), np.zeros(7), np.zeros(7)
         self._success_rate, self._commands = 0.0, 0
         self._seen = 0
         self._releases = link.target().releases
@@ -159,6 +159,7 @@ class _Session:
 
     def _note(self, state: Any) -> None:
         self._position, self._velocity = np.array(state.q), np.array(state.dq)
+        self._external_torque = np.array(state.tau_ext_hat_filtered)
         self._success_rate = float(state.control_command_success_rate)
         self._send_state()
 
@@ -172,6 +173,7 @@ class _Session:
                 self._severe,
                 self._success_rate,
                 self._commands,
+                self._external_torque,
             )
         )
 

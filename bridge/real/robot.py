@@ -106,6 +106,7 @@ class RealRobot:
             emergency=base.emergency,
             battery=_fraction(base.battery),
             arm_success=_fraction(arm.success_rate) if arm.commands > 0 else None,
+            external_torque=arm.external_torque,
         )
 
     def write(self, setpoint: Setpoint) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 
 from controller.config import ControllerConfig
 from controller.identity import Token
+from controller.motion.contact import ContactMonitor
 from controller.motion.follower import Follower, Measured
 from controller.motion.surroundings import Surroundings
 from controller.whole_body.collision import CollisionModel
@@ -29,6 +30,8 @@ from rolling_panda.transport.inbox import Inbox
 _LONGEST = 0.1
 #: Gain of the odometry correction, small so that odometry noise does not shake the tool.
 _BELIEVED = 0.2
+#: Control periods of motion that are remembered, to go back on: 3 s.
+_TRAIL = 300
 #: A larger difference from the odometry (m, rad) is no noise: the estimate is reset.
 _ELSEWHERE = 0.05
 
@@ -146,6 +149,9 @@ class Body:
         self.follower = Follower(config.motion, self._method, self.dt)
         self._base = BaseEstimate(self.robot.drive)
         self.tracking_error = TrackingErrorMonitor()
+        self.contact = ContactMonitor(config.contact, self.robot)
+        #: Way of the last seconds, oldest first: positions of ξ (9) and of the tool (3, m, odom).
+        self.trail: deque[tuple[Array, Array]] = deque(maxlen=_TRAIL)
         self.measured: Measured | None = None
 
     def update(self, inbox: Inbox) -> None:
@@ -162,6 +168,11 @@ class Body:
             wheels = wheels_ahead(measured, sent[:2], ahead, self._config.motion.base_lag_s)
             self.measured = Measured(q, self.robot.kinematics(q), sent)
             self._method.start_period(sent, self.setpoints.before, wheels)
+            around = self.surroundings.model.obstacles
+            moves = not self.setpoints.at_rest
+            self.contact.update(joints.message, q, self.measured.kinematics, moves, around)
+            if moves:
+                self.trail.append((q[3:], self.measured.kinematics.T_odom_tool.translation))
         self.surroundings.update(inbox.newest(Obstacles))
 
 

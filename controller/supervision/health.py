@@ -31,6 +31,8 @@ class Health(Struct, frozen=True):
         ledger: Reason why the ledger cannot record; None if it can.
         tracking_error: Tracking error above its limit; None without one.
         obstacles: Age of the camera frame behind the obstacles.
+        unfelt: Why contacts are no longer felt; None if they are, or never were.
+        contact: What was touched beyond a limit, until the robot has gone back from it; None without one.
     """
 
     joints: float
@@ -45,10 +47,18 @@ class Health(Struct, frozen=True):
     ledger: Reason | None = None
     tracking_error: Reason | None = None
     obstacles: float = 0.0
+    unfelt: Reason | None = None
+    contact: Reason | None = None
 
 
 def health(
-    inbox: Inbox, overruled: bool, now: float, ledger: Reason | None = None, tracking_error: Reason | None = None
+    inbox: Inbox,
+    overruled: bool,
+    now: float,
+    ledger: Reason | None = None,
+    tracking_error: Reason | None = None,
+    unfelt: Reason | None = None,
+    contact: Reason | None = None,
 ) -> Health:
     """Compute the health of the inputs.
 
@@ -58,6 +68,8 @@ def health(
         now: Monotonic time (s).
         ledger: Reason why the ledger cannot record.
         tracking_error: Tracking error above its limit.
+        unfelt: Why contacts are no longer felt.
+        contact: What was touched beyond a limit.
     """
 
     def age(at: float | None) -> float:
@@ -77,6 +89,8 @@ def health(
         ledger=ledger,
         tracking_error=tracking_error,
         obstacles=_picture_age(inbox.newest(Obstacles), joints, now),
+        unfelt=unfelt,
+        contact=contact,
     )
 
 
@@ -108,7 +122,8 @@ def check(mode: Mode, moving: bool, health: Health, config: SupervisionConfig) -
 
     Args:
         mode: Of the machine.
-        moving: True where motion may be under way outside AUTO and TELEOP (bringing the arm home).
+        moving: True where motion may be under way outside AUTO and TELEOP (bringing the arm home, going back after a
+            contact).
         health: Health of the inputs.
         config: Age limits.
     """
@@ -121,6 +136,8 @@ def check(mode: Mode, moving: bool, health: Health, config: SupervisionConfig) -
     why = sensors(health, config)
     if why is None and health.watchdog:
         why = reasons.watchdog_holds()
+    if why is None and mode != "PROTECTIVE_STOP":
+        why = health.contact
     if why is not None:
         return Verdict("protect", why)
     why = supervision(health, config, teleoperated=mode == "TELEOP")
@@ -131,7 +148,8 @@ def check(mode: Mode, moving: bool, health: Health, config: SupervisionConfig) -
 
 def cause(health: Health, config: SupervisionConfig) -> Reason | None:
     """Cause that still blocks the end of a PROTECTIVE_STOP or FAULT; None if it is gone."""
-    return health.ledger or sensors(health, config) or (reasons.watchdog_holds() if health.watchdog else None)
+    held = reasons.watchdog_holds() if health.watchdog else None
+    return health.ledger or sensors(health, config) or held or health.contact
 
 
 def sensors(health: Health, config: SupervisionConfig) -> Reason | None:
@@ -140,6 +158,8 @@ def sensors(health: Health, config: SupervisionConfig) -> Reason | None:
         return reasons.other_controller()
     if health.tracking_error is not None:
         return health.tracking_error
+    if health.unfelt is not None:
+        return health.unfelt
     if health.joints > config.joints_max_age_s:
         return _stale(reasons.joints_stale, health.joints, config.joints_max_age_s, topics.JOINTS.name)
     if health.odometry > config.odometry_max_age_s:

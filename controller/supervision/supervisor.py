@@ -94,8 +94,16 @@ class Supervisor:
         self._inbox = inbox
         if (changed := self.fencing.update(self.bridge, now)) is not None:
             self._event_log.log(changed)
-        tracking_error = self._movement.body.tracking_error.reason
-        self.health = safety.health(inbox, self.fencing.overruled, now, trouble, tracking_error)
+        body = self._movement.body
+        self.health = safety.health(
+            inbox,
+            self.fencing.overruled,
+            now,
+            trouble,
+            body.tracking_error.reason,
+            reasons.touch_unfelt() if body.contact.lost else None,
+            None if body.contact.touch is None else body.contact.touch.reason,
+        )
 
     def review(self, stops: tuple[m.StopRequest, ...], now: float) -> None:
         """Latch new stops, end the motion that is no longer allowed, and start motion by hand."""
@@ -109,12 +117,17 @@ class Supervisor:
         lost = self.authority.review(self._inbox.newest(Presence), self._movement.at_rest, now)
         if lost is not None:
             self._pause(lost, now)
-        verdict = safety.check(self.mode, self._movement.homing, self.health, self._config)
+        moving = self._movement.homing or self._movement.backing_off
+        verdict = safety.check(self.mode, moving, self.health, self._config)
         match verdict:
             case safety.Verdict("fault", reason):
                 self.event(Event.FAULT, now, reason)
             case safety.Verdict("protect", reason):
+                # Where the robot goes back after a contact, another cause ends that.
+                self._movement.stay()
                 self.event(Event.PROTECT, now, reason)
+                if reason is self.health.contact:
+                    self._movement.back_off()
             case safety.Verdict("pause", reason):
                 self._pause(reason, now)
         self._movement.sequence.finish_cut_and_pause(self.authority.unwatched(now))
@@ -132,6 +145,8 @@ class Supervisor:
             halted = modes.severity(self.mode) >= modes.severity("PAUSED")
             told = reasons.robot_halted if halted else reasons.mode_changed
             self._event_log.log(told(before.mode, self.mode, self.state.reason))
+            if event is Event.ARM and self._movement.body.contact.force is None:
+                self._event_log.log(reasons.touch_never_felt())
         return transition.refused
 
     def _note_interruption(self, before: m.Mode) -> None:

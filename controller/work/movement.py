@@ -10,6 +10,7 @@ from controller.motion.body import Body
 from controller.motion.follower import Measured, Tracking
 from controller.motion.teleoperation import Teleoperation
 from controller.whole_body.task import Method
+from controller.work.back_off import BackOff
 from controller.work.camera_views import BOARD, ROW, view_postures
 from controller.work.cutting import CutSequence
 from controller.work.homing import Homing
@@ -24,6 +25,10 @@ from rolling_panda.mode_table import Event
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.transport.inbox import Inbox, Received
+
+
+#: Rest between a contact and the way back (s), in which the arm stops to swing.
+_REST_S = 0.2
 
 
 class MotionResult(Struct, frozen=True):
@@ -87,6 +92,8 @@ class Movement:
         model, home = RobotModel(robot_config), np.array(config.work.home)
         self._views = {views.prefix: view_postures(model, home, views) for views in (BOARD, ROW)}
         self._homing: Homing | None = None
+        self._backs_off, self._rested = False, 0
+        self._back_off: BackOff | None = None
         #: Tracking of the last step's motion; None without one.
         self.tracking: Tracking | None = None
 
@@ -94,6 +101,11 @@ class Movement:
     def homing(self) -> bool:
         """Whether the arm is being brought home."""
         return self._homing is not None
+
+    @property
+    def backing_off(self) -> bool:
+        """Whether the robot stops after a contact, and goes back on its way."""
+        return self._backs_off
 
     @property
     def at_rest(self) -> bool:
@@ -119,13 +131,17 @@ class Movement:
         """Begin to bring the arm home."""
         self._homing = Homing(self._config, self.body.follower, self.body.dt)
 
+    def back_off(self) -> None:
+        """Begin to go back from what was touched, once the robot is at rest."""
+        self._backs_off, self._back_off, self._rested = self._config.contact.back_off > 0.0, None, 0
+
     def stay(self) -> None:
-        """Stop bringing the arm home."""
-        self._homing = None
+        """Stop bringing the arm home, or going back."""
+        self._homing, self._backs_off = None, False
 
     def leave(self, mode: m.Mode) -> None:
         """End the motion source of a mode that has ended."""
-        self._homing = None
+        self.stay()
         if mode == "AUTO":
             self.sequence.abort()
         self.teleoperation.refuse()
@@ -155,6 +171,10 @@ class Movement:
         """
         self.tracking = None
         robot = self.body.measured
+        if mode == "PROTECTIVE_STOP" and self._backs_off and robot is not None and held:
+            return self._go_back(robot)
+        self._backs_off = False
+        self.body.contact.clear()
         if robot is None or not held or mode not in ("READY", "TELEOP", "AUTO"):
             return self.ramp()
         if mode == "TELEOP":
@@ -194,6 +214,22 @@ class Movement:
         elif work.finished:
             change = Event.FINISHED, work.summary
         return MotionResult(work.xi, work.cut, change)
+
+    def _go_back(self, robot: Measured) -> MotionResult:
+        if self._back_off is None:
+            # Blades that close are not pulled away from what they hold.
+            self._rested = self._rested + 1 if self.at_rest and not self.sequence.cutting else 0
+            if self._rested * self.body.dt >= _REST_S:
+                self._back_off = BackOff(
+                    self._config.motion, self.body.trail, self._config.contact.back_off, self.body.dt
+                )
+            return self.ramp()
+        if self._back_off.done:
+            self._event_log.log(reasons.backed_off() if self._back_off.arrived else reasons.not_backed_off())
+            self._backs_off = False
+            return self.ramp()
+        self.tracking = self._back_off.step(robot, self.body.follower, self.body.contact)
+        return MotionResult(self.tracking.xi)
 
     def _bring_home(self, robot: Measured) -> MotionResult:
         homing = self._homing

@@ -104,16 +104,16 @@ def severity_order() -> str:
 
 
 def limits_table() -> str:
-    """One row for each related time limit."""
+    """One row for each related limit."""
     rows = []
     for limit in LIMITS.values():
         where = "configuration" if limit.configurable else f"`{limit.source.partition(':')[0]}`"
-        rows.append((limit.label, f"{limit.seconds(limit.usual):.4g} s", where))
-    return table(("time limit or period", "usual", "where"), rows)
+        rows.append((limit.label, f"{limit.seconds(limit.usual):.4g} {limit.unit}", where))
+    return table(("limit or period", "usual", "where"), rows)
 
 
 def relations_table() -> str:
-    """One row for each relation between time limits."""
+    """One row for each relation between limits."""
     return table(("relation", "why"), [(str(relation), relation.why) for relation in RELATIONS])
 
 

@@ -8,6 +8,7 @@ from msgspec import Meta, Struct
 from rolling_panda.messages.types import (
     Actuated,
     ActuatedVelocity,
+    ArmTorques,
     BridgeKind,
     Count,
     Epoch,
@@ -113,12 +114,15 @@ class JointState(Message, frozen=True, kw_only=True):
         sequence: Strictly increasing.
         position: [θ_l, θ_r, q₁…q₇] (rad).
         velocity: Their velocities (rad/s).
+        external_torque: Torques of q₁…q₇ by what touches the arm (N·m), as the arm estimates them: with offsets, and
+            with the base's acceleration and tilt, of which it knows nothing. None if the robot has no estimate.
     """
 
     header: Header
     sequence: Count
     position: Actuated
     velocity: ActuatedVelocity
+    external_torque: ArmTorques | None = None
 
 
 class Odometry(Message, frozen=True, kw_only=True):

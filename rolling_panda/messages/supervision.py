@@ -156,6 +156,7 @@ class ControllerState(Message, frozen=True, kw_only=True):
             disarmed.
         relaxed_limits: Safety limits that its configuration sets less strictly than usual, within their hard bounds.
         postures: Postures that the arm can be led to: those of the program, then the saved ones.
+        tool_force: Force at the tool that explains the arm's external torques (N); None without them.
     """
 
     header: Header
@@ -182,6 +183,7 @@ class ControllerState(Message, frozen=True, kw_only=True):
     interrupted: Interrupted = ""
     relaxed_limits: tuple[Reason, ...] = ()
     postures: tuple[SavedPosture, ...] = ()
+    tool_force: NonNegative | None = None
 
 
 #: Public key of a client: a digest of its session, never the session itself. Empty = nobody.

@@ -26,6 +26,9 @@ QuatXyzw = tuple[Unit, Unit, Unit, Unit]
 Actuated = tuple[Angle, Angle, Angle, Angle, Angle, Angle, Angle, Angle, Angle]
 #: Velocities of ξ (rad/s).
 ActuatedVelocity = tuple[Speed, Speed, Speed, Speed, Speed, Speed, Speed, Speed, Speed]
+Torque = Annotated[float, Meta(ge=-1000.0, le=1000.0)]
+#: Torques of q₁…q₇ (N·m).
+ArmTorques = tuple[Torque, Torque, Torque, Torque, Torque, Torque, Torque]
 #: Wall clock, seconds since 1970.
 WallTime = Annotated[float, Meta(ge=0.0, le=1e11)]
 Role = Literal["viewer", "operator", "supervisor"]

@@ -1,6 +1,6 @@
 """Arrays as the wire has them: tuples of plain numbers."""
 
-from rolling_panda.messages.types import Actuated, PlanarPose, Vector3
+from rolling_panda.messages.types import Actuated, ArmTorques, PlanarPose, Vector3
 from rolling_panda.model.differential_drive import Array
 
 
@@ -14,6 +14,12 @@ def actuated(values: Array) -> Actuated:
     """Values over ξ (9)."""
     a, b, c, d, e, f, g, h, i = values.tolist()
     return a, b, c, d, e, f, g, h, i
+
+
+def arm_torques(values: Array) -> ArmTorques:
+    """Torques of the arm's joints (7)."""
+    a, b, c, d, e, f, g = values.tolist()
+    return a, b, c, d, e, f, g
 
 
 def planar_pose(q: Array) -> PlanarPose:

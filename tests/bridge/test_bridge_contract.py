@@ -5,6 +5,7 @@ import random
 import time
 from collections.abc import Callable, Iterator
 
+import numpy as np
 import pytest
 
 from bridge.config import BridgeConfig
@@ -85,6 +86,34 @@ def test_base_and_arm_follow_and_the_telemetry_says_what_they_do(rig: Rig) -> No
     assert odometry.pose.x > 0.1
     assert not rig.state.watchdog
     assert rig.plant.breaches() == []
+
+
+def felt(rig: Rig) -> tuple[float, ...] | None:
+    return next(out.joints for out in reversed(rig.outputs) if out.joints).external_torque
+
+
+def test_what_pushes_the_arm_is_in_its_joint_states(rig: Rig) -> None:
+    rig.run(0.3, REST)
+    before = felt(rig)
+    assert before is not None and np.abs(before).max() < 5.0
+    rig.plant.push((0.0, 0.0, 0.0, 9.0, 0.0, 0.0, -3.0))
+
+    def pushed() -> bool:
+        return felt(rig) == pytest.approx(np.add(before, (0.0, 0.0, 0.0, 9.0, 0.0, 0.0, -3.0)), abs=1.0)
+
+    assert rig.until(pushed, REST)
+    rig.plant.push((0.0,) * 7)
+    assert rig.until(lambda: felt(rig) == pytest.approx(before, abs=1.0), REST)
+
+
+def test_an_estimate_that_is_no_number_is_told_as_none_and_the_joints_all_the_same(rig: Rig) -> None:
+    rig.run(0.3, REST)
+    rig.plant.push((0.0, math.nan, 0.0, 0.0, 0.0, 0.0, 0.0))
+    assert rig.until(lambda: felt(rig) is None, REST)
+    sequence = rig.echo
+    rig.plant.push((0.0, 1e9, 0.0, 0.0, 0.0, 0.0, 0.0))
+    assert rig.until(lambda: (felt(rig) or (0.0, 0.0))[1] == 1000.0, REST)
+    assert rig.echo > sequence
 
 
 def test_silence_of_the_controller_brings_everything_to_rest_in_time(rig: Rig) -> None:

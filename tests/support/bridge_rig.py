@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -31,6 +31,8 @@ class Plant(Protocol):
     def breaches(self) -> list[str]: ...  # every limit that was broken, in words
 
     def bites(self) -> int: ...  # how often the blades have met
+
+    def push(self, torques: tuple[float, ...]) -> None: ...  # external torques of the arm's joints (7, N·m) from now on
 
 
 @dataclass(frozen=True)
@@ -182,9 +184,15 @@ class SimulatedPlant:
         self._last = np.zeros(9)
         self._bites = 0
         self._breaches: list[str] = []
+        self._push = np.zeros(7)
 
     def read(self) -> Measurement:
-        return self.robot.read()
+        measured = self.robot.read()
+        assert measured.external_torque is not None
+        return replace(measured, external_torque=measured.external_torque + self._push)
+
+    def push(self, torques: tuple[float, ...]) -> None:
+        self._push = np.array(torques)
 
     def write(self, setpoint: Setpoint) -> None:
         change = np.abs(setpoint.xi - self._last)

@@ -84,5 +84,8 @@ class RealPlant(Devices):
     def velocity(self) -> Array:
         return np.array([*self.base.tell()["wheels"], *self.arm.tell()["dq"]])
 
+    def push(self, torques: tuple[float, ...]) -> None:
+        self.arm.tell("push " + " ".join(map(str, torques)))
+
     def bites(self) -> int:
         return int(self.base.tell_all("report")["cutter"]["bites"])

@@ -6,9 +6,11 @@ Physics assumptions in addition to those of `bridge.sim.robot.model`:
   Coriolis torques of the arm are compensated, as on the Panda.
 - Encoders are exact, unless the world has offsets and slip. Odometry errors come from slip and from contact with wood.
 - Severed wood disappears at once, unless it hangs in the wires. Wind moves canes before the camera and the blades.
+- Canes push back where the world has elastic ones. `bridge.sim.robot.touch` has the arm's estimate of torques by touch.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,8 +23,10 @@ from bridge.core.picture import Picture
 from bridge.sim.camera.render_process import CameraRenderer
 from bridge.sim.robot.cutter import CutResult, Cutter, close_blades
 from bridge.sim.robot.model import STEP_S, build_plant
+from bridge.sim.robot.touch import ExternalTorque, touching_spheres
 from bridge.sim.robot.trace import CUTTER, TraceWriter
 from bridge.sim.vineyard.row import Row
+from bridge.sim.world.canes import Canes, Push
 from bridge.sim.world.config import CALM, WorldConfig
 from bridge.sim.world.errors import draw_errors
 from bridge.sim.world.ground import Ground
@@ -144,6 +148,10 @@ class SimulatedRobot:
             # No wheel begins below the ground, into which it would be pressed.
             self._data.qpos[2] = self._ground.at(self._data.xpos[self._wheels, :2])[0].max()
         self._M = np.zeros((self._plant.model.nv, self._plant.model.nv))
+        self._spheres = touching_spheres(self._plant, config.opening)
+        self._canes = Canes(1e9 * world.cane_modulus, self._spheres.radii, STEP_S) if world.cane_modulus > 0.0 else None
+        self._pushes: Sequence[Push] = ()
+        self._felt = ExternalTorque(self._plant, seed)
         self._servos = self._make_servos()
         self._settle()
         self._cutter = Cutter(config)
@@ -173,6 +181,7 @@ class SimulatedRobot:
             cutter.outcome,
             cutter.detail,
             emergency=self.emergency,
+            external_torque=self._felt.value.copy(),
         )
 
     def write(self, setpoint: Setpoint) -> None:
@@ -233,6 +242,26 @@ class SimulatedRobot:
         """Ground truth T_world_tool (4×4)."""
         return self._site(self._plant.tool)
 
+    def true_touch(self) -> tuple[float, str]:
+        """Ground truth: sum of the forces between robot and row (N), and body of the robot with the largest one.
+
+        The body is that of a joint, `base_link`, or empty without any contact.
+        """
+        force, each = np.zeros(6), dict[int, float]()
+        for number, geoms in enumerate(self._data.contact.geom):
+            on = self._plant.solid[geoms]
+            if on.any():
+                mujoco.mj_contactForce(self._plant.model, self._data, number, force)
+                body = int(self._plant.model.geom_bodyid[geoms[int(on[0])]])
+                each[body] = each.get(body, 0.0) + float(np.linalg.norm(force[:3]))
+        for push in self._pushes:
+            body = int(self._spheres.bodies[push.part])
+            each[body] = each.get(body, 0.0) + float(np.linalg.norm(push.force))
+        if not each:
+            return 0.0, ""
+        hardest = max(each, key=lambda body: each[body])
+        return sum(each.values()), self._plant.model.body(hardest).name
+
     def true_camera(self) -> Array:
         """Ground truth T_world_camera (4×4)."""
         return self._site(self._plant.camera)
@@ -267,9 +296,14 @@ class SimulatedRobot:
             # A wheel that slips turns faster than it rolls.
             xi = np.concatenate([xi[:2] / slip.factor, xi[2:]])
         data.ctrl[:] = self._servos.step(xi, data.qvel[plant.xi_v], self._inertia())
+        if self._canes is not None:
+            self._pushes = self._canes.push(self.row, self._spheres.centers(data))
+        pushed = self._spheres.generalized(data, self._pushes)
+        data.qfrc_applied[:] = pushed
         # The bias is 1 ms old, as in the Panda's own compensation.
-        data.qfrc_applied[plant.arm_v] = data.qfrc_bias[plant.arm_v]
+        data.qfrc_applied[plant.arm_v] += data.qfrc_bias[plant.arm_v]
         mujoco.mj_step(plant.model, data)
+        self._felt.step(data, self._M, pushed)
         if slip is not None:
             slip.roll(data.qvel[plant.xi_v[:2]] * STEP_S)
 
@@ -299,6 +333,7 @@ class SimulatedRobot:
         data.qpos[plant.xi_q[:2]] = 0.0
         data.qpos[plant.xi_q[2:]] = self._start_arm
         mujoco.mj_forward(plant.model, data)
+        self._felt.restart()
         if self._slip is not None:
             self._slip.encoders = np.zeros(2)
 

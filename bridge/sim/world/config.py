@@ -44,6 +44,7 @@ class WorldConfig(Struct, frozen=True, forbid_unknown_fields=True):
         depth_lost: Fraction of thin wood without depth in each frame, in patches: low sun on active stereo.
         blade_failures: Fraction of bites through a cane of 8 mm that jam or leave it hanging by its bark. It grows with
             the force that the diameter needs.
+        cane_modulus: Young's modulus of canes (GPa), by which they push back and bend; 0 lets them give way to all.
         hanging: Fraction of severed canes that do not fall but hang in the wires, a little beside where they stood.
     """
 
@@ -64,6 +65,7 @@ class WorldConfig(Struct, frozen=True, forbid_unknown_fields=True):
     sway: Annotated[float, Meta(ge=0.0, le=0.1)] = 0.0
     depth_lost: Share = 0.0
     blade_failures: Share = 0.0
+    cane_modulus: Annotated[float, Meta(ge=0.0, le=20.0)] = 0.0
     hanging: Share = 0.0
 
 
@@ -89,6 +91,7 @@ PRESETS: dict[str, WorldConfig] = {
         sway=0.005,
         depth_lost=0.2,
         blade_failures=0.02,
+        cane_modulus=6.5,
         hanging=0.1,
     ),
     "storm": WorldConfig(
@@ -109,6 +112,7 @@ PRESETS: dict[str, WorldConfig] = {
         sway=0.020,
         depth_lost=0.5,
         blade_failures=0.10,
+        cane_modulus=6.5,
         hanging=0.3,
     ),
 }

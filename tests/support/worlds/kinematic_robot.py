@@ -41,6 +41,7 @@ class KinematicRobot:
         watching: Whether they see the robot.
         deaf: Types of messages that do not arrive.
         bridge_changes: What the bridge says in place of what is.
+        external_torque: Torques of the arm's joints by what touches it (7, N·m); None without an estimate.
     """
 
     controller: Controller
@@ -64,6 +65,7 @@ class KinematicRobot:
     watching: bool = True
     deaf: set[type] = field(default_factory=set)
     bridge_changes: dict[str, Any] = field(default_factory=dict)
+    external_torque: m.ArmTorques | None = None
 
     def __post_init__(self) -> None:
         """Place the robot at the origin."""
@@ -198,7 +200,15 @@ class KinematicRobot:
         header = m.Header(self.now, "odom")
         v, w = self.model.drive.twist(float(self.xi[0]), float(self.xi[1]))
         position, velocity = actuated(self.q[3:]), actuated(self.xi)
-        self.hear(m.JointState(header=header, sequence=self._sequence, position=position, velocity=velocity))
+        self.hear(
+            m.JointState(
+                header=header,
+                sequence=self._sequence,
+                position=position,
+                velocity=velocity,
+                external_torque=self.external_torque,
+            )
+        )
         pose = planar_pose(self.q)
         self.hear(m.Odometry(header=header, sequence=self._sequence, pose=pose, linear=v, angular=w))
 

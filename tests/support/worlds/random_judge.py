@@ -244,4 +244,6 @@ class Judge:
             return False
         if mode == "TELEOP":
             return now - self.held_at.get(holder, -1.0) <= HOLD_S + PERIOD_S
-        return mode in ("AUTO", "READY") and bool(self.started_by)
+        # Back from what it has touched.
+        back = mode == "PROTECTIVE_STOP" and world.touched
+        return back or (mode in ("AUTO", "READY") and bool(self.started_by))

@@ -8,6 +8,7 @@ import numpy as np
 
 from bridge.core.interface import Measurement
 from controller.motion.body import Setpoints
+from controller.motion.contact import Touch
 from controller.motion.teleoperation import Teleoperation
 from controller.supervision.modes import Event
 from controller.work.cutting import Blades
@@ -111,34 +112,45 @@ class Movement:
         Movement.newest = self
         self._setpoints, self._saturation = Setpoints(saturation), saturation
         nothing = SimpleNamespace(reason=None, model=SimpleNamespace(nearest=None))
-        self.body = SimpleNamespace(robot=MODEL, measured=None, tracking_error=nothing, surroundings=nothing)
+        contact = SimpleNamespace(touch=None, lost=False, force=None)
+        self.body = SimpleNamespace(
+            robot=MODEL, measured=None, tracking_error=nothing, surroundings=nothing, contact=contact
+        )
         self.sequence = Sequence(config, queue, run_id, self.chance, permit)
         follower = SimpleNamespace(jog=lambda xi, robot: SimpleNamespace(xi=np.clip(xi, -0.03, 0.03)))
         self.teleoperation = Teleoperation(
             config.teleoperation, config.work, follower, MODEL.drive, 0.01, lambda *_: None
         )
         self.posture_check = SimpleNamespace(refusal=lambda *_: None)
-        self.tracking, self._home = None, 0
+        self.tracking, self._home, self._back = None, 0, 0
 
     @property
     def homing(self):
         return self._home > 0
 
     @property
+    def backing_off(self):
+        return self._back > 0
+
+    @property
     def at_rest(self):
         return self._setpoints.at_rest
 
     def update(self, inputs):
-        pass
+        if not self.at_rest and self.chance.random() < 0.002:
+            self.body.contact.touch = Touch("cutter", "post 1", np.array([0.0, 40.0, 0.0]), np.zeros(3))
 
     def go_home(self):
         self._home = 30
 
+    def back_off(self):
+        self._back = 30
+
     def stay(self):
-        self._home = 0
+        self._home = self._back = 0
 
     def leave(self, mode):
-        self._home = 0
+        self.stay()
         if mode == "AUTO":
             self.sequence.abort()
         self.teleoperation.refuse()
@@ -155,6 +167,10 @@ class Movement:
         return MotionResult(self._saturation.ramp(self._setpoints.sent))
 
     def step(self, mode, held, now):
+        if mode == "PROTECTIVE_STOP" and self._back and held:
+            self._back -= 1
+            return MotionResult(-WHEELS)
+        self._back, self.body.contact.touch = 0, None
         if not held or mode not in ("READY", "TELEOP", "AUTO"):
             return self.ramp()
         if mode == "TELEOP":

@@ -95,6 +95,11 @@ class RandomWorld:
         self.judge.mode(self.controller.mode, "restart", self)
         self.judge.restored(self.queue)
 
+    @property
+    def touched(self):
+        """Whether the arm has touched something, and has not gone back from it yet."""
+        return Movement.newest.body.contact.touch is not None
+
     # --- one step ------------------------------------------------------------------------------------------------
 
     def step(self):

@@ -39,6 +39,8 @@ export type Actuated = [number, number, number, number, number, number, number, 
 
 export type ActuatedVelocity = [number, number, number, number, number, number, number, number, number];
 
+export type ArmTorques = [number, number, number, number, number, number, number];
+
 export type BridgeKind = "sim"|"real"|"fakes";
 
 export type Mode = "IDLE"|"READY"|"TELEOP"|"AUTO"|"PAUSED"|"PROTECTIVE_STOP"|"FAULT"|"ESTOP_LATCHED";
@@ -250,6 +252,8 @@ export interface ControllerState {
   relaxed_limits: Reason[];
   /** Postures that the arm can be led to: those of the program, then the saved ones. */
   postures: SavedPosture[];
+  /** Force at the tool that explains the arm's external torques (N); None without them. */
+  tool_force: number|null;
 }
 
 /** Messages of a topic that were refused for one reason. */
@@ -316,6 +320,8 @@ export interface JointState {
   position: Actuated;
   /** Their velocities (rad/s). */
   velocity: ActuatedVelocity;
+  /** Torques of q₁…q₇ by what touches the arm (N·m), as the arm estimates them: with offsets, and with the base's acceleration and tilt, of which it knows nothing. None if the robot has no estimate. */
+  external_torque: ArmTorques|null;
 }
 
 /** Pose of base_link in odom, on the ground plane. */

@@ -84,6 +84,16 @@ export const READINGS = Object.freeze([
     read: (/** @type {PageState} */ state) => scaled(state.controller?.joint_margin, DEGREE),
   },
   {
+    id: "tool-force",
+    place: "engineer",
+    unit: "N",
+    fullScale: 30,
+    // As `light_force` of the controller's configuration.
+    warnAbove: 8,
+    format: (/** @type {number} */ value) => value.toFixed(0),
+    read: (/** @type {PageState} */ state) => state.controller?.tool_force ?? null,
+  },
+  {
     id: "base-speed",
     unit: "m/s",
     fullScale: 0.5,

@@ -1,0 +1,263 @@
+"""Contact: external torques of the arm, less what is no touch, against limits; and what was probably touched.
+
+The arm's estimate of external torques has offsets, and it takes the base's acceleration and tilt for touch. So the
+torque by the base's acceleration is taken away, and a slow average. What remains is judged in every period by the force
+at the tool that explains it, and joint by joint. When a limit is passed, the place is searched: the spot of the robot
+at which one force explains the torques of all joints, and the known obstacle that is there.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from controller.config import ContactConfig
+from controller.whole_body.collision_geometry import part_of, robot_geometry
+from controller.whole_body.compiled import MATRIX, NOTHING, NUMBER, VECTOR, compiled
+from controller.whole_body.obstacle import Obstacle
+from rolling_panda import messages as m
+from rolling_panda import reasons
+from rolling_panda.model.differential_drive import Array
+from rolling_panda.model.robot import ARM_Q, Kinematics, RobotModel
+
+#: Time constants of the average that is taken away (s): in motion, during a light push, and at rest.
+_MOVING_S, _PUSHED_S, _RESTING_S = 1.0, 10.0, 0.1
+#: Time constant of the arm's own filter (s), with which the base's acceleration is delayed alike.
+_FILTER_S = 0.01
+#: Longest gap between two joint states that is integrated (s).
+_GAP_S = 0.06
+#: Lever (m) below which the tool's force is not resolved: the arm feels no force through its joints' axes.
+_LEVER = 0.1
+#: Speed of a joint or wheel below which the robot is at rest (rad/s).
+_AT_REST = 0.005
+#: SD of the torques that a force explains (N·m): offsets and friction, less in the wrist.
+_SD = np.array([0.5, 0.5, 0.5, 0.5, 0.2, 0.2, 0.2])
+#: Misfit beyond the least one, as a fraction of the torques, up to which a spot may be the touched one.
+_UNSURE = 0.15
+#: An obstacle farther than this from the spot was not touched (m): the camera errs, and capsules are larger than links.
+_BESIDE = 0.05
+#: Least cosine between the force and the direction from obstacle to robot.
+_TOWARDS = 0.3
+
+
+@dataclass(frozen=True)
+class Touch:
+    """What was probably touched.
+
+    Attributes:
+        part: Of the robot.
+        obstacle: Name of the known obstacle there; empty for something unknown.
+        force: On the robot (3, N, odom).
+        point: Where (3, m, odom).
+    """
+
+    part: str
+    obstacle: str
+    force: Array
+    point: Array
+
+    @property
+    def reason(self) -> m.Reason:
+        """The contact as a reason."""
+        size = float(np.linalg.norm(self.force))
+        if self.obstacle:
+            return reasons.touched(self.part, self.obstacle, size)
+        return reasons.touched_unknown(self.part, size)
+
+
+class ContactMonitor:
+    """Judges external torques. Call `update` with each joint state; `clear` forgets a contact."""
+
+    def __init__(self, config: ContactConfig, robot: RobotModel) -> None:
+        """Feel nothing.
+
+        Args:
+            config: Section `[controller.contact]`.
+            robot: Robot model; its Pinocchio data is not touched.
+        """
+        self._config, self._robot = config, robot
+        # Kinematics of others are in the robot's own data.
+        self._data = robot.model.createData()
+        self._limits = np.array([config.stop_torque] * 4 + [config.stop_torque_wrist] * 3)
+        self._spots = Spots(robot)
+        self._average, self._accelerated = np.zeros(7), np.zeros(3)
+        self._speed, self._stamp = np.zeros(3), -math.inf
+        #: Torques by touch (7, N·m).
+        self.torque: Array = np.zeros(7)
+        #: Force at the tool that explains them best (N); None without an estimate of the arm.
+        self.force: float | None = None
+        #: Whether the robot has told external torques before and no longer does.
+        self.lost = False
+        #: The contact beyond a limit, until it is cleared; None without one.
+        self.touch: Touch | None = None
+
+    @property
+    def beyond(self) -> bool:
+        """Whether a limit is passed now."""
+        return self.force is not None and (
+            self.force >= self._config.stop_force or bool((np.abs(self.torque) >= self._limits).any())
+        )
+
+    def update(
+        self, joints: m.JointState, q: Array, kinematics: Kinematics, moves: bool, obstacles: Sequence[Obstacle]
+    ) -> None:
+        """Take in a joint state; the same one again changes nothing.
+
+        Args:
+            joints: With the external torques.
+            q: Configuration (12) at its time.
+            kinematics: At q.
+            moves: Whether the robot is commanded to move: at rest it is being touched, but touches nothing.
+            obstacles: What is known around.
+        """
+        passed = joints.header.stamp - self._stamp
+        if passed == 0.0:
+            return
+        self._stamp = joints.header.stamp
+        if joints.external_torque is None:
+            self.lost, self.force = self.lost or self.force is not None, None
+            return
+        begins = self.force is None or not 0.0 < passed <= _GAP_S
+        self.lost = False
+        raw = np.array(joints.external_torque) + self._by_base(joints, q, passed, begins)
+        rests = not moves and max(map(abs, joints.velocity)) < _AT_REST
+        if begins:
+            self._average[:] = raw
+        force = _felt(raw, self._average, kinematics.J[:3, ARM_Q], self.torque)
+        self.force = force
+        if self.touch is None and moves and self.beyond:
+            self.touch = self._spots.touched(q, self.torque, obstacles)
+        if self.touch is None:
+            lasts = _RESTING_S if rests else _MOVING_S if force < self._config.light_force else _PUSHED_S
+            _follow(self._average, raw, passed / lasts)
+
+    def clear(self) -> None:
+        """Forget the contact. At rest the robot feels itself anew: what still presses then counts as none."""
+        self.touch = None
+
+    def _by_base(self, joints: m.JointState, q: Array, passed: float, begins: bool) -> Array:
+        """Torques (7, N·m) that moved the arm along with the base, of which the arm's estimate knows nothing."""
+        robot = self._robot
+        v, omega = robot.drive.twist(joints.velocity[0], joints.velocity[1])
+        c, s = math.cos(q[2]), math.sin(q[2])
+        speed = np.array([c * v, s * v, omega])
+        if begins:
+            self._accelerated[:] = 0.0
+        else:
+            share = 1.0 - math.exp(-passed / _FILTER_S)
+            self._accelerated += share * ((speed - self._speed) / passed - self._accelerated)
+        self._speed = speed
+        M = pin.crba(robot.model, self._data, q)
+        torque: Array = M[:3, ARM_Q].T @ self._accelerated
+        return torque
+
+
+@compiled(NUMBER(VECTOR, VECTOR, MATRIX, VECTOR))
+def _felt(raw: Array, average: Array, J: Array, torque: Array) -> float:
+    """Write torque = raw − average (7) and return |f| of the force that solves min |Jᵀ f − torque|² + λ²|f|²."""
+    for i in range(7):
+        torque[i] = raw[i] - average[i]
+    # J Jᵀ + λ², symmetric, and J torque.
+    a = b = c = d = e = g = x = y = z = 0.0
+    for i in range(7):
+        a += J[0, i] * J[0, i]
+        b += J[0, i] * J[1, i]
+        c += J[0, i] * J[2, i]
+        d += J[1, i] * J[1, i]
+        e += J[1, i] * J[2, i]
+        g += J[2, i] * J[2, i]
+        x += J[0, i] * torque[i]
+        y += J[1, i] * torque[i]
+        z += J[2, i] * torque[i]
+    a, d, g = a + _LEVER * _LEVER, d + _LEVER * _LEVER, g + _LEVER * _LEVER
+    # Its inverse by cofactors.
+    A, B, C = d * g - e * e, c * e - b * g, b * e - c * d
+    D, E, G = a * g - c * c, b * c - a * e, a * d - b * b
+    determinant = a * A + b * B + c * C
+    fx, fy, fz = A * x + B * y + C * z, B * x + D * y + E * z, C * x + E * y + G * z
+    return math.sqrt(fx * fx + fy * fy + fz * fz) / determinant
+
+
+@compiled(NOTHING(VECTOR, VECTOR, NUMBER))
+def _follow(average: Array, raw: Array, share: float) -> None:
+    """Let the average (7) go towards raw (7)."""
+    for i in range(7):
+        average[i] += min(share, 1.0) * (raw[i] - average[i])
+
+
+class Spots:
+    """Spots of arm and tool that may be touched: spheres along the axes of their capsules.
+
+    Attributes:
+        parts: Part of the robot that each is on (n).
+        joints: Joint of the Pinocchio model that carries it (n).
+        radii: (n, m).
+    """
+
+    def __init__(self, robot: RobotModel) -> None:
+        """Spread them over arm and tool."""
+        self._robot, self._data = robot, robot.model.createData()
+        geometry = robot_geometry(robot)
+        spots: list[tuple[str, int, Array, float]] = []
+        first = int(robot.model.joints[robot.model.getJointId("panda_joint1")].id)
+        for item in geometry.geometryObjects:
+            if item.parentJoint < first or not isinstance(item.geometry, pin.coal.Capsule):
+                continue
+            radius, half = float(item.geometry.radius), float(item.geometry.halfLength)
+            axis = item.placement.rotation[:, 2]
+            for along in np.linspace(-half, half, 1 + math.ceil(2.0 * half / max(radius, 0.02))):
+                spots.append((part_of(item.name), item.parentJoint, item.placement.translation + along * axis, radius))
+        self.parts = [part for part, *_ in spots]
+        self.joints = [joint for _, joint, *_ in spots]
+        self._local = np.array([place for *_, place, _ in spots])
+        self.radii = np.array([radius for *_, radius in spots])
+        # Which of the arm's joints move a spot.
+        order = {joint: index for index, joint in enumerate(range(first, first + 7))}
+        self._moved = np.array([[index <= order[joint] for index in range(7)] for joint in self.joints], float)
+
+    def at(self, q: Array) -> tuple[Array, Array]:
+        """Middles at q (12) (n×3, m, odom), and velocity of each by each of the arm's joints (n×7×3)."""
+        pin.computeJointJacobians(self._robot.model, self._data, q)
+        spots = np.array(
+            [self._data.oMi[joint].act(place) for joint, place in zip(self.joints, self._local, strict=True)]
+        )
+        J = self._data.J[:, ARM_Q]
+        velocities: Array = (J[:3].T[None] + np.cross(J[3:].T[None], spots[:, None])) * self._moved[:, :, None]
+        return spots, velocities
+
+    def touched(self, q: Array, torque: Array, obstacles: Sequence[Obstacle]) -> Touch:
+        """Where one force explains torques (7, N·m) best at q (12), and the known obstacle there."""
+        spots, velocities = self.at(q)
+        A = velocities / _SD[:, None]
+        wanted = torque / _SD
+        normal = A.transpose(0, 2, 1) @ A + 1e-2 * np.eye(3)
+        forces = np.linalg.solve(normal, A.transpose(0, 2, 1) @ wanted[:, None])[:, :, 0]
+        misfits = np.linalg.norm((A @ forces[:, :, None])[:, :, 0] - wanted, axis=1) / float(np.linalg.norm(wanted))
+        likely = np.flatnonzero(misfits <= misfits.min() + _UNSURE)
+        spot, name = self._beside(spots, forces, likely, obstacles)
+        if not name:
+            spot = int(misfits.argmin())
+        force = forces[spot]
+        inwards = force / max(float(np.linalg.norm(force)), 1e-9)
+        return Touch(self.parts[spot], name, force, spots[spot] - self.radii[spot] * inwards)
+
+    def _beside(self, spots: Array, forces: Array, likely: Any, obstacles: Sequence[Obstacle]) -> tuple[int, str]:
+        """The likely spot nearest to an obstacle that its force comes from, and its name; empty for none."""
+        if not obstacles:
+            return 0, ""
+        start = np.array([o.start for o in obstacles])
+        along = np.array([o.end for o in obstacles]) - start
+        around = np.array([o.radius for o in obstacles])
+        offset = spots[likely, None] - start[None]
+        place = np.clip((offset * along).sum(axis=2) / np.maximum((along**2).sum(axis=1), 1e-12), 0.0, 1.0)
+        offset -= place[:, :, None] * along
+        distance = np.linalg.norm(offset, axis=2)
+        gaps = distance - self.radii[likely, None] - around
+        size = np.maximum(np.linalg.norm(forces[likely], axis=1), 1e-9)
+        towards = (offset * forces[likely, None]).sum(axis=2) / np.maximum(distance, 1e-9) / size[:, None]
+        gaps[towards < _TOWARDS] = np.inf
+        row, column = np.unravel_index(int(gaps.argmin()), gaps.shape)
+        return (int(likely[row]), obstacles[int(column)].name) if gaps[row, column] < _BESIDE else (0, "")

@@ -1,0 +1,280 @@
+"""What the controller makes of external torques: is something touched, where, and what is it probably?"""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from controller.config import ContactConfig, ControllerConfig
+from controller.motion.contact import ContactMonitor
+from controller.whole_body.obstacle import Obstacle
+from rolling_panda import commands as intents
+from rolling_panda import messages as m
+from rolling_panda.messages.supervision import TeleopTarget
+from rolling_panda.model.robot import ARM_Q, RobotModel
+from rolling_panda.model.wire_values import arm_torques, vector3
+from tests.support.controller_at_work import robot, run_until, working
+from tests.support.points import point
+
+ROBOT = RobotModel()
+LIMITS = ContactConfig()
+HOME = np.array([0.3, -0.2, 0.4, 0.0, 0.0, *ControllerConfig().work.home])
+PUSH = (0.0, 0.0, 0.0, 9.0, 0.0, 0.0, 0.0)
+
+
+class Arm:
+    """An arm that tells torques of our choice, a control period apart."""
+
+    def __init__(self, q=HOME):
+        self.q, self.monitor, self.number = q, ContactMonitor(LIMITS, ROBOT), 0
+        self.kinematics = ROBOT.kinematics(q)
+
+    def tell(self, torque, periods=1, moves=True, velocity=(0.0,) * 9, obstacles=()):
+        for _ in range(periods):
+            self.number += 1
+            told = None if torque is None else arm_torques(np.asarray(torque, float))
+            joints = m.JointState(
+                header=m.Header(self.number / 100),
+                sequence=self.number,
+                position=tuple(self.q[3:].tolist()),
+                velocity=velocity,
+                external_torque=told,
+            )
+            self.monitor.update(joints, self.q, self.kinematics, moves, obstacles)
+        return self.monitor
+
+    def by(self, force):
+        """Torques of a force at the tool (3, N, odom)."""
+        return self.kinematics.J[:3, ARM_Q].T @ np.asarray(force, float)
+
+
+@pytest.mark.parametrize("force", [(0, 7, 0), (5, 0, 5), (-4, 0, -6)])
+def test_a_light_push_at_the_tool_is_told_and_stops_nothing(force):
+    arm = Arm()
+    arm.tell(np.zeros(7), 50)
+    found = arm.tell(arm.by(force), 20)
+    assert found.force == pytest.approx(np.linalg.norm(force), rel=0.25)
+    assert found.touch is None
+
+
+@pytest.mark.parametrize("force", [(0, -40, 0), (35, 0, 10), (0, 0, 45)])
+def test_a_push_beyond_the_limit_is_a_contact_of_that_force(force):
+    arm = Arm()
+    arm.tell(np.zeros(7), 50)
+    touch = arm.tell(arm.by(force)).touch
+    assert touch is not None and touch.part in ("blades", "cutter", "camera", "link7")
+    assert touch.force == pytest.approx(np.array(force), abs=0.25 * np.linalg.norm(force))
+    assert touch.reason.code == "touched_unknown"
+
+
+def test_at_rest_the_robot_is_touched_but_touches_nothing_and_what_presses_then_counts_as_none():
+    arm = Arm()
+    arm.tell(np.zeros(7), 50)
+    assert arm.tell(arm.by((0, -60, 0)), 100, moves=False).touch is None
+    assert arm.tell(arm.by((0, -60, 0)), 10).touch is None
+    assert arm.tell(np.zeros(7)).touch is not None, "what pressed is gone, and something pushes the other way"
+
+
+def test_offsets_of_the_estimate_are_no_touch():
+    arm, offset = Arm(), np.array([4.0, -5.0, 3.0, 5.0, 1.0, -1.0, 1.0])
+    arm.tell(offset, 100, moves=False)
+    found = arm.tell(offset + [0.5, 0.5, -0.5, 0.5, 0.2, 0.1, 0.1], 200)
+    assert found.touch is None and found.force < 1.0
+
+
+def test_the_acceleration_of_the_base_is_no_touch():
+    """The arm's own estimate takes it for a force of tens of newtons."""
+    arm, speed = Arm(), 0.0
+    c, s = np.cos(HOME[2]), np.sin(HOME[2])
+    M = pin.crba(ROBOT.model, ROBOT.model.createData(), HOME)
+    arm.tell(np.zeros(7), 50)
+    felt = np.zeros(7)
+    for _ in range(20):
+        speed += 1.5 * 0.01
+        # Of an arm with a filter of 10 ms.
+        felt += (1 - np.exp(-1.0)) * (-M[:2, ARM_Q].T @ [1.5 * c, 1.5 * s] - felt)
+        wheels = ROBOT.drive.wheels(speed, 0.0)
+        found = arm.tell(felt, velocity=(*wheels, *(0.0,) * 7))
+        assert found.force < 2.0 and found.touch is None
+    assert np.abs(felt).max() > 4.0
+
+
+def places(rng, count=60):
+    """Postures with a spot of the arm that something pushes hard from a direction that the arm feels."""
+    spots = ContactMonitor(LIMITS, ROBOT)._spots
+    far = [k for k, part in enumerate(spots.parts) if part not in ("link1", "link2", "link3")]
+    for _ in range(count):
+        q = HOME.copy()
+        q[ARM_Q] = np.clip(q[ARM_Q] + rng.uniform(-0.6, 0.6, 7), ROBOT.limits.lower[ARM_Q], ROBOT.limits.upper[ARM_Q])
+        where, velocities = spots.at(q)
+        spot = int(rng.choice(far))
+        force = 60.0 * (lambda v: v / np.linalg.norm(v))(rng.normal(size=3))
+        yield q, where[spot] - spots.radii[spot] * force / 60.0, force, velocities[spot] @ force
+
+
+@pytest.mark.parametrize("kind", ["post", "wire", "cordon", "trunk", "cane"])
+def test_it_names_the_obstacle_that_is_where_a_single_force_explains_all_torques(kind):
+    rng = np.random.default_rng(len(kind))
+    right = wrong = contacts = 0
+    for q, place, force, torque in places(rng):
+        across = np.cross(force, rng.normal(size=3))
+        half = 0.5 * across / np.linalg.norm(across)
+        away = -force / np.linalg.norm(force)
+        # Seen 15 mm too far away; another obstacle stands behind the robot.
+        axis, behind = place + 0.035 * away, place - 0.3 * away
+        around = (
+            Obstacle(f"{kind} 4", kind, vector3(axis - half), vector3(axis + half), 0.02),
+            Obstacle("post 9", "post", vector3(behind - half), vector3(behind + half), 0.02),
+        )
+        arm = Arm(q)
+        arm.tell(np.zeros(7), 50)
+        touch = arm.tell(torque + rng.normal(0.0, 0.1, 7), 3, obstacles=around).touch
+        if touch is not None:
+            contacts += 1
+            right += touch.obstacle == f"{kind} 4"
+            wrong += touch.obstacle == "post 9"
+    assert contacts > 50
+    assert right / contacts > 0.85 and wrong / contacts < 0.1, (right, wrong, contacts)
+
+
+def test_an_obstacle_far_from_where_it_pushes_is_not_blamed():
+    arm = Arm()
+    arm.tell(np.zeros(7), 50)
+    tool = arm.kinematics.T_odom_tool.translation
+    far = Obstacle("post 1", "post", (tool[0], tool[1] + 0.3, 0.0), (tool[0], tool[1] + 0.3, 2.0), 0.04)
+    touch = arm.tell(arm.by((0, -60, 0)), obstacles=(far,)).touch
+    assert touch is not None and touch.obstacle == ""
+
+
+def test_without_an_estimate_nothing_is_felt_and_an_estimate_that_ends_is_noticed():
+    arm = Arm()
+    found = arm.tell(None, 10)
+    assert found.force is None and not found.lost
+    arm.tell(np.zeros(7), 10)
+    found = arm.tell(None)
+    assert found.force is None and found.lost
+    found = arm.tell(np.zeros(7))
+    assert found.force == pytest.approx(0.0, abs=1e-9) and not found.lost
+
+
+def test_the_same_joint_state_twice_is_one():
+    arm = Arm()
+    arm.tell(np.zeros(7), 10)
+    arm.tell(arm.by((0, 6, 0)))
+    force = arm.monitor.force
+    arm.number -= 1
+    assert arm.tell(arm.by((0, -60, 0))).force == force
+
+
+# --- the robot's reaction ---------------------------------------------------------------------------------------------
+
+
+def held(**motion):
+    return TeleopTarget(sequence=1, hold=True, user="ada", **motion)
+
+
+def led():
+    """A robot that is led by hand: joint 1 turns."""
+    r = robot(external_torque=(0.0,) * 7)
+    r.step()
+    assert r.ask(intents.Arm(user="ada")).ok
+    r.run(0.1)
+    r.teleop = held(joints=(0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    r.run(1.0)
+    assert r.state.mode == "TELEOP"
+    return r
+
+
+def test_led_by_hand_it_stops_goes_back_and_waits_for_a_person():
+    r = led()
+    there, since = r.model.kinematics(r.q).T_odom_tool.translation, r.now
+    r.external_torque = (20.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    run_until(r, lambda s: s.mode == "PROTECTIVE_STOP", since + 0.2)
+    assert r.state.reason.code == "touched_unknown"
+    assert not r.ask(intents.Acknowledge(user="ada")).ok, "it has not gone back yet"
+    run_until(r, lambda s: not np.any(r.xi.round(3)), since + 0.5)
+    farthest = r.q.copy()
+    r.external_torque = (0.0,) * 7
+    r.run(3.0)
+    assert r.q[5] < farthest[5] - 0.05, "back along the way it came"
+    assert np.linalg.norm(r.model.kinematics(r.q).T_odom_tool.translation - there) < 0.08
+    assert r.state.mode == "PROTECTIVE_STOP" and r.state.reason.code == "touched_unknown"
+    still = r.q.copy()
+    r.run(1.0)
+    assert np.allclose(r.q, still, atol=1e-6), "the held control moves it no more"
+    assert r.ask(intents.Acknowledge(user="ada")).ok
+    r.run(0.1)
+    assert r.state.mode == "PAUSED"
+
+
+def test_what_still_pushes_ends_the_way_back_and_after_a_look_the_robot_can_be_led_away():
+    r = led()
+    r.external_torque = PUSH[:3] + (25.0,) + PUSH[4:]
+    r.run(1.0)
+    assert r.state.mode == "PROTECTIVE_STOP"
+    r.teleop = None
+    r.run(3.0)
+    assert any("could not go back" in line for line in r.events)
+    assert not np.any(r.xi.round(3))
+    assert r.ask(intents.Acknowledge(user="ada")).ok
+    assert r.ask(intents.Resume(user="ada")).ok
+    r.run(0.1)
+    r.teleop = held(joints=(-0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    r.run(0.5)
+    assert r.state.mode == "TELEOP", r.state.reason
+
+
+def test_a_stop_during_the_way_back_ends_it():
+    r = led()
+    r.external_torque = (20.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    r.run(0.6)
+    r.external_torque = (0.0,) * 7
+    assert r.xi[2] < -0.01, "on the way back"
+    r.stop()
+    r.run(0.4)
+    assert r.state.mode == "ESTOP_LATCHED" and not np.any(r.xi.round(3))
+
+
+def test_without_fresh_joint_states_it_does_not_go_on_back():
+    r = led()
+    r.external_torque = (20.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    r.run(0.5)
+    r.external_torque = (0.0,) * 7
+    r.frozen_sensors = True
+    r.run(0.6)
+    assert r.state.mode == "PROTECTIVE_STOP" and r.state.reason.code == "joints_stale"
+    r.frozen_sensors = False
+    before = r.q.copy()
+    r.run(2.0)
+    assert np.allclose(r.q, before, atol=1e-6)
+
+
+def test_in_automatic_work_the_accepted_point_stays_accepted():
+    r = working((point("a", (2.0, 0.75, 1.0)),), external_torque=(0.0,) * 7)
+    r.run(2.0)
+    assert r.state.mode == "AUTO"
+    r.external_torque = PUSH[:3] + (30.0,) + PUSH[4:]
+    r.run(0.5)
+    r.external_torque = (0.0,) * 7
+    r.run(3.0)
+    assert r.state.mode == "PROTECTIVE_STOP" and r.state.interrupted == "work"
+    assert [entry.state for entry in r.state.queue] == ["ACCEPTED"]
+    assert r.state.tool_force is not None
+
+
+def test_an_estimate_that_ends_stops_the_robot_until_it_is_back():
+    r = led()
+    r.external_torque = None
+    r.run(0.3)
+    assert r.state.mode == "PROTECTIVE_STOP" and r.state.reason.code == "touch_unfelt"
+    r.run(2.0)
+    assert not r.ask(intents.Acknowledge(user="ada")).ok
+    r.external_torque = (0.0,) * 7
+    r.run(1.2)
+    assert r.ask(intents.Acknowledge(user="ada")).ok
+
+
+def test_a_robot_without_an_estimate_works_and_says_that_it_feels_nothing():
+    r = working((point("a", (0.45, 0.75, 1.0)),))
+    r.run(1.0)
+    assert r.state.mode == "AUTO" and r.state.tool_force is None
+    assert any("reports no external torques" in line for line in r.events)

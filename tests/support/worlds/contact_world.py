@@ -1,0 +1,180 @@
+"""A simulated robot beside one obstacle: led against it by hand, or at work, with the truth of every touch."""
+
+from collections.abc import Sequence
+
+import msgspec
+import numpy as np
+
+from bridge.config import BridgeConfig
+from bridge.core.bridge import TICK_S, BridgeCore
+from bridge.core.odometer import Odometer
+from bridge.sim.robot.robot import SimulatedRobot
+from bridge.sim.vineyard.row import Rod, Row
+from bridge.sim.world.config import CALM, WorldConfig
+from controller.config import ControllerConfig
+from controller.core import Controller
+from rolling_panda import commands as intents
+from rolling_panda import messages as m
+from rolling_panda.config import RobotConfig, load_section
+from rolling_panda.messages.perception import Capsule, Obstacles
+from rolling_panda.messages.supervision import BaseVelocity, Person, Presence, TeleopTarget
+from rolling_panda.model.differential_drive import Array
+from rolling_panda.model.robot import RobotModel
+from rolling_panda.model.wire_values import vector3
+from rolling_panda.resources import resource
+from tests.support.cameras import Blind
+from tests.support.controller_config import controller_config
+from tests.support.points import point
+from tests.support.worlds.world import RobotWorld
+
+MODEL = RobotModel()
+USER = "ada"
+#: Speed of joints and wheels below which the robot is at rest (rad/s).
+AT_REST = 0.01
+#: Distance between points of endless work, where the first is (m), and how many are ahead.
+_SPACING_M, _FIRST_M, _AHEAD = 0.12, 0.6, 4
+
+
+def capsule_of(rod: Rod, shift: Array | None = None) -> Capsule:
+    """What perception says of a rod, which it may see elsewhere (3, m)."""
+    by = np.zeros(3) if shift is None else shift
+    ends = vector3(rod.start + by), vector3(rod.end + by)
+    return Capsule(rod.kind, *ends, rod.start_radius, rod.end_radius, rod.vine, rod.spur)
+
+
+class ContactWorld(RobotWorld):
+    """Somebody is always present and holds control.
+
+    Attributes:
+        touches: For each ms in which the row touched the robot: time (s), force (N), body of the robot.
+        modes: Time (s) of each change of mode, and the mode.
+        rests: Times (s) of the ms in which nothing was sent but zero and nothing moved.
+        events: Lines of the log.
+    """
+
+    def __init__(
+        self,
+        rods: Sequence[Rod] = (),
+        seen: Sequence[Capsule] = (),
+        arm: Sequence[float] | None = None,
+        world: WorldConfig = CALM,
+        seed: int = 0,
+        config: ControllerConfig | None = None,
+    ) -> None:
+        """Arm the robot.
+
+        Args:
+            rods: What stands there.
+            seen: What perception tells of it.
+            arm: Posture at the start (7, rad); None for the survey posture.
+            world: Disturbances.
+            seed: Of the disturbances.
+            config: Section `[controller]`.
+        """
+        # There is no camera, so that nothing is looked at from near.
+        settings = controller_config(
+            config or ControllerConfig(), work__pre_cut_check=False, work__post_cut_check=False
+        )
+        posture = tuple(settings.work.home if arm is None else arm)
+        bridge = msgspec.structs.replace(
+            load_section(resource("assets/config/sim.toml"), "bridge", BridgeConfig), start_arm=posture
+        )
+        self.robot = SimulatedRobot(bridge, Row(tuple(rods)), Blind(), None, world, seed)
+        odometer = Odometer(MODEL.drive, bridge.odometry, TICK_S, seed)
+        self.held: TeleopTarget | None = None
+        self.touches: list[tuple[float, float, str]] = []
+        self.modes: list[tuple[float, m.Mode]] = []
+        self.rests: list[float] = []
+        self.events: list[m.Reason] = []
+        self.cut_ids: set[str] = set()
+        self._seen, self._shown, self._moving = tuple(seen), 0, False
+        self.state: m.ControllerState | None = None
+        super().__init__(
+            BridgeCore(self.robot, bridge, MODEL.limits, odometer, "sim"),
+            Controller(settings, RobotConfig()),
+            settings.rate_hz,
+            seed=seed,
+        )
+        self._control_ticks = round(1.0 / (settings.rate_hz * self.tick_s))
+        self.run(0.3)
+        assert self.command(intents.Arm(user=USER)).ok
+        self.run(0.1)
+
+    @property
+    def touch(self) -> m.Reason | None:
+        """What the robot says that it touched; None if it says nothing."""
+        stopped = self.state is not None and self.state.mode == "PROTECTIVE_STOP"
+        return self.state.reason if stopped and self.state is not None else None
+
+    def hold(self, joints: Array | None = None, base: float | None = None) -> None:
+        """Hold a motion from now on: velocities of the joints (7, rad/s), or of the base (m/s); neither lets go."""
+        if joints is None and base is None:
+            self.held = None
+            return
+        self.held = TeleopTarget(
+            sequence=0,
+            hold=True,
+            user=USER,
+            joints=None if joints is None else tuple(joints.tolist()),  # type: ignore[arg-type]
+            base=None if base is None else BaseVelocity(base, 0.0),
+        )
+
+    def work(self) -> None:
+        """Begin automatic work that never ends: there is always one more point, and somebody who accepts it."""
+        self.offer()
+        assert self.command(intents.Start(user=USER)).ok
+
+    def offer(self) -> None:
+        """Show and accept as many points as are to be ahead."""
+        wanted = len(self.cut_ids) + _AHEAD
+        if wanted <= self._shown:
+            return
+        points = tuple(
+            point(f"p{k}", (_FIRST_M + k * _SPACING_M, 0.75, 1.0), vine=k // 8, spur=k % 8)
+            for k in range(max(0, self._shown - _AHEAD), wanted)
+        )
+        self._shown = wanted
+        header = m.Header(self.now, "odom")
+        self.say(m.PruningPoints(header=header, segmenter="none", frames=1, points=points))
+        self.run(0.02)
+        self.command(intents.AcceptAll(user=USER, confidence=0.0))
+
+    def configuration(self) -> Array:
+        """True configuration (12)."""
+        return np.concatenate([self.robot.true_base().pose, self.robot.read().position])
+
+    def tick(self) -> None:
+        """Advance one tick, and note the truth."""
+        if (self.ticks + 1) % self._control_ticks == 0:
+            self._others_speak()
+        super().tick()
+        force, body = self.robot.true_touch()
+        if force > 0.0:
+            self.touches.append((self.now, force, body))
+        if not self.modes or self.modes[-1][1] != self.controller.mode:
+            self.modes.append((self.now, self.controller.mode))
+        measured = self.robot.read()
+        if not self._moving and float(np.abs(measured.velocity).max()) < AT_REST:
+            self.rests.append(self.now)
+
+    def say(self, message: m.Message) -> None:
+        """Send a message; what the controller says of itself is kept."""
+        super().say(message)
+        match message:
+            case m.ControllerState():
+                self.state = message
+            case m.LogEvent():
+                self.events.append(message.reason)
+            case m.MotionCommand():
+                self._moving = any(message.xi)
+            case m.CutCommand():
+                self.cut_ids.add(message.cut_id)
+
+    def _others_speak(self) -> None:
+        number = self.ticks + 1
+        self.say(Presence(sequence=number, people=(Person(USER, USER, "supervisor", 0.0, 0.0),)))
+        for process in ("server", "perception"):
+            self.say(m.Heartbeat(process=process, sequence=number))  # type: ignore[arg-type]
+        self.say(Obstacles(header=m.Header(self.now, "odom"), capsules=self._seen))
+        if self.held is not None:
+            self.say(msgspec.structs.replace(self.held, sequence=number))
