@@ -42,7 +42,7 @@ _RUN_UP, _HALF, _CANE = 0.12, 0.35, (0.05, 0.4)
 #: Error of perception where it has seen the obstacle (m): beyond what the collision guard keeps.
 _FARTHER = 0.03
 #: Fastest joint (rad/s), least distance of all else at the start (m), and time after the first touch (s).
-_FASTEST, _CLEAR, _AFTER_S = 1.2, 0.03, 5.0
+_FASTEST, _CLEAR, _AFTER_S = 1.2, 0.03, 2.6
 #: Time until an obstacle must have been met (s), and draws of a posture.
 _LIMIT_S, _DRAWS = 8.0, 400
 #: Forces below this are no contact (N).

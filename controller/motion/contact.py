@@ -27,6 +27,9 @@ from rolling_panda.model.robot import ARM_Q, Kinematics, RobotModel
 _MOVING_S, _PUSHED_S, _RESTING_S = 1.0, 10.0, 0.1
 #: Time constant of the arm's own filter (s), with which the base's acceleration is delayed alike.
 _FILTER_S = 0.01
+#: Acceleration of the base below which it moves the arm by no torque worth while (m/s², rad/s²).
+_STEADY = 0.005
+_NOTHING = np.zeros(7)
 #: Longest gap between two joint states that is integrated (s).
 _GAP_S = 0.06
 #: Lever (m) below which the tool's force is not resolved: the arm feels no force through its joints' axes.
@@ -83,8 +86,9 @@ class ContactMonitor:
         self._data = robot.model.createData()
         self._limits = np.array([config.stop_torque] * 4 + [config.stop_torque_wrist] * 3)
         self._spots = Spots(robot)
-        self._average, self._accelerated = np.zeros(7), np.zeros(3)
-        self._speed, self._stamp = np.zeros(3), -math.inf
+        self._average, self._stamp = np.zeros(7), -math.inf
+        #: Of the base: velocity forward (m/s) and yaw rate (rad/s), and the rates of both.
+        self._speed = self._accelerated = (0.0, 0.0)
         #: Torques by touch (7, N·m).
         self.torque: Array = np.zeros(7)
         #: Force at the tool that explains them best (N); None without an estimate of the arm.
@@ -140,18 +144,19 @@ class ContactMonitor:
 
     def _by_base(self, joints: m.JointState, q: Array, passed: float, begins: bool) -> Array:
         """Torques (7, N·m) that moved the arm along with the base, of which the arm's estimate knows nothing."""
-        robot = self._robot
-        v, omega = robot.drive.twist(joints.velocity[0], joints.velocity[1])
-        c, s = math.cos(q[2]), math.sin(q[2])
-        speed = np.array([c * v, s * v, omega])
-        if begins:
-            self._accelerated[:] = 0.0
-        else:
+        v, omega = self._robot.drive.twist(joints.velocity[0], joints.velocity[1])
+        forward, turning = (0.0, 0.0) if begins else self._accelerated
+        if not begins:
             share = 1.0 - math.exp(-passed / _FILTER_S)
-            self._accelerated += share * ((speed - self._speed) / passed - self._accelerated)
-        self._speed = speed
-        M = pin.crba(robot.model, self._data, q)
-        torque: Array = M[:3, ARM_Q].T @ self._accelerated
+            forward += share * ((v - self._speed[0]) / passed - forward)
+            turning += share * ((omega - self._speed[1]) / passed - turning)
+        self._speed, self._accelerated = (v, omega), (forward, turning)
+        if abs(forward) < _STEADY and abs(turning) < _STEADY and abs(v * omega) < _STEADY:
+            return _NOTHING
+        c, s = math.cos(q[2]), math.sin(q[2])
+        acceleration = np.array([c * forward - s * v * omega, s * forward + c * v * omega, turning])
+        M = pin.crba(self._robot.model, self._data, q)
+        torque: Array = acceleration @ M[:3, ARM_Q]
         return torque
 
 

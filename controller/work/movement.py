@@ -26,7 +26,6 @@ from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.transport.inbox import Inbox, Received
 
-
 #: Rest between a contact and the way back (s), in which the arm stops to swing.
 _REST_S = 0.2
 
