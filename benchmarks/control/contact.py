@@ -307,8 +307,10 @@ def main(argv: Sequence[str]) -> int:
             flush=True,
         )
         keep()
-    for kind in words.kind or tuple(KINDS):
-        for number in range(words.count):
+    kinds: tuple[WoodClass, ...] = tuple(words.kind or KINDS)
+    # All kinds in turn: a run that is ended early has something of each.
+    for number in range(words.count):
+        for kind in kinds:
             rng = np.random.default_rng([words.seed + number, list(KINDS).index(kind)])
             part, speed = PARTS[number % len(PARTS)], SPEEDS[(number // len(PARTS)) % len(SPEEDS)]
             scene = scenes.draw(kind, part, speed, rng)
@@ -317,6 +319,7 @@ def main(argv: Sequence[str]) -> int:
                 trials.append(run_trial(scene, Trial(kind, part, speed, seen), words.seed + number))
                 print(f"  {trials[-1]}", flush=True)
                 keep()
+    for kind in kinds:
         group = [trial for trial in trials if trial.kind == kind]
         figures = summarise(group)
         print(

@@ -112,7 +112,7 @@ PRESETS: dict[str, WorldConfig] = {
         sway=0.020,
         depth_lost=0.5,
         blade_failures=0.10,
-        cane_modulus=6.5,
+        cane_modulus=8.0,
         hanging=0.3,
     ),
 }
