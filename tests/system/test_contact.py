@@ -89,7 +89,7 @@ def test_it_rests_at_once_goes_back_and_says_what_it_was(
 
 
 def test_a_cane_is_pushed_aside_and_that_is_known() -> None:
-    rod, _ = in_the_way("cane", "cutter", REACH, UP, 0.004, below=0.5)
+    rod, _ = in_the_way("cane", "cutter", REACH, UP, 0.004, below=0.3)
     loop = ContactWorld((rod,), world=only(("cane_modulus",), "field"))
     loop.hold(joints=scaled(REACH, "cutter", 0.1))
     until_touched(loop)
@@ -99,8 +99,8 @@ def test_a_cane_is_pushed_aside_and_that_is_known() -> None:
         strongest = max(strongest, loop.controller.contact.force or 0.0)
     pushed = max(force for _, force, _ in loop.touches)
     assert loop.controller.mode == "TELEOP" and loop.touch is None
-    assert 2.0 < pushed < 25.0
-    assert strongest == pytest.approx(pushed, rel=0.5)
+    assert 5.0 < pushed < 20.0
+    assert 0.4 * pushed < strongest < 1.3 * pushed
 
 
 def test_a_cane_that_is_touched_at_its_foot_stops_the_arm() -> None:
