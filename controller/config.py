@@ -246,8 +246,8 @@ class ContactConfig(Struct, frozen=True, forbid_unknown_fields=True):
     """
 
     light_force: Annotated[float, at_most(20.0)] = 8.0
-    stop_force: Annotated[float, at_most(30.0)] = 25.0
-    stop_torque: Annotated[float, at_most(20.0)] = 12.0
+    stop_force: Annotated[float, at_most(30.0)] = 20.0
+    stop_torque: Annotated[float, at_most(20.0)] = 10.0
     stop_torque_wrist: Annotated[float, at_most(10.0)] = 5.0
     back_off: Annotated[float, within(0.0, 0.2, or_zero=True)] = 0.05
 

@@ -113,8 +113,8 @@ _ALL: Final = (
     Limit("controller.teleoperation.hold_max_age_s", 0.15),
     # What the arm feels, and what stops it in its control box.
     Limit("controller.contact.light_force", 8.0, unit="N"),
-    Limit("controller.contact.stop_force", 25.0, unit="N"),
-    Limit("controller.contact.stop_torque", 12.0, unit="N·m"),
+    Limit("controller.contact.stop_force", 20.0, unit="N"),
+    Limit("controller.contact.stop_torque", 10.0, unit="N·m"),
     Limit("real.arm.contact_force", 30.0, unit="N"),
     Limit("real.arm.contact_torque", 20.0, unit="N·m"),
     Limit("controller.work.cut_timeout_s", 3.0),

@@ -14,6 +14,7 @@ from tests.support.fake_wire import bridge_state, joints
 
 CONFIG = SupervisionConfig()
 FULL, ASTRAY = reasons.ledger_failed("the disk is full"), reasons.said("joint 3 does not follow")
+TOUCHED = reasons.touched("cutter", "post 3", 40.0)
 ALL = frozenset({"bridge", "controller", "perception", "server"})
 HEALTHY = Health(0.01, 0.02, 0.05, 0.05, 0.05, ALL, watchdog=False, overruled=False)
 
@@ -99,6 +100,8 @@ def test_the_most_severe_of_several_counts():
         ({"ledger": FULL}, FULL),
         ({"overruled": True}, reasons.other_controller()),
         ({"tracking_error": ASTRAY}, ASTRAY),
+        ({"unfelt": reasons.touch_unfelt()}, reasons.touch_unfelt()),
+        ({"contact": TOUCHED}, TOUCHED),
         ({"joints": 1.0}, reasons.joints_stale(1.0, CONFIG.joints_max_age_s)),
         ({"odometry": 1.0}, reasons.odometry_stale(1.0, CONFIG.odometry_max_age_s)),
         ({"bridge": 1.0}, reasons.bridge_stale(1.0, CONFIG.bridge_max_age_s)),
@@ -110,6 +113,17 @@ def test_a_stop_or_fault_cannot_be_left_while_its_cause_is_there(changes, reason
     assert cause(HEALTHY, CONFIG) is None
     # These end motion, and are no cause of a stop.
     assert cause(msgspec.structs.replace(HEALTHY, server=9.0, perception=9.0, obstacles=9.0), CONFIG) is None
+
+
+def test_a_contact_stops_every_motion_and_while_the_robot_goes_back_only_another_cause_does():
+    for mode in ("AUTO", "TELEOP"):
+        assert verdict(mode, contact=TOUCHED) == Verdict("protect", TOUCHED)
+    touched = msgspec.structs.replace(HEALTHY, contact=TOUCHED)
+    assert check("READY", True, touched, CONFIG) == Verdict("protect", TOUCHED)
+    assert check("READY", False, touched, CONFIG) is None
+    assert check("PROTECTIVE_STOP", True, touched, CONFIG) is None
+    astray = msgspec.structs.replace(touched, tracking_error=ASTRAY)
+    assert check("PROTECTIVE_STOP", True, astray, CONFIG) == Verdict("protect", ASTRAY)
 
 
 def test_old_pictures_of_what_stands_around_stop_automatic_work_alone():

@@ -52,9 +52,9 @@ def until_touched(loop: ContactWorld) -> float:
     ("kind", "part", "joints", "axis", "radius", "speed", "most_n", "seen"),
     [
         ("post", "cutter", TURN, UP, 0.04, 0.1, 80.0, False),
-        ("post", "cutter", TURN, UP, 0.04, 0.4, 250.0, True),
-        ("post", "link4", TURN, UP, 0.04, 0.2, 250.0, False),
-        ("wire", "cutter", REACH, ALONG, 0.00125, 0.2, 200.0, True),
+        ("post", "cutter", TURN, UP, 0.04, 0.4, 400.0, False),
+        ("post", "link6", TURN, UP, 0.04, 0.2, 250.0, False),
+        ("wire", "cutter", REACH, ALONG, 0.00125, 0.2, 200.0, False),
         ("cordon", "cutter", REACH, ALONG, 0.02, 0.2, 200.0, True),
         ("trunk", "link5", TURN, UP, 0.03, 0.2, 250.0, False),
     ],
