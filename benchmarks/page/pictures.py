@@ -31,8 +31,8 @@ FLAGS = (
     "--ignore-gpu-blocklist",
 )
 DESKTOP, TABLET, TELEPHONE = (1280, 800), (1024, 768), (390, 844)
-#: So many colours are enough for a page, and a third of the size.
-COLOURS = 64
+#: So many keep the colour of each sign; 64 made a blue tick green.
+COLOURS = 256
 STILL = "view.jpg"
 _PATIENCE_MS = 60_000
 
