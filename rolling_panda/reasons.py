@@ -351,12 +351,12 @@ def impossible_in_paused(event: str) -> None:
     """{event} is not possible while the robot is paused."""
 
 
-@_reason("warning", "acknowledge first")
+@_reason("warning", "press I've checked first")
 def impossible_in_protective_stop(event: str) -> None:
     """{event} is not possible during a protective stop."""
 
 
-@_reason("warning", "acknowledge first")
+@_reason("warning", "press I've checked first")
 def impossible_in_fault(event: str) -> None:
     """{event} is not possible in a fault."""
 

@@ -132,7 +132,7 @@ def test_it_is_approved_by_its_hash_and_what_changed_is_said_when_it_expires(pag
 
 def test_where_it_is_required_start_says_what_is_missing(page: Page, server: PlayedServer) -> None:
     page.locator("#show-preview").click()
-    box = page.get_by_label("Before each cut")
+    box = page.get_by_label("Preview before each cut")
     box.click()
     until(page, lambda: ("/api/preview/required", {"required": True}) in server.posted)
     expect(box).not_to_be_checked()

@@ -65,7 +65,7 @@ def test_what_was_previewed_and_approved_is_what_is_done(tmp_path: Path, chromiu
     """It takes half a minute of work by the real processes, so it is among the slow ones."""
     with LiveRobot(tmp_path) as robot, operator_page(chromium_path, robot.link("ada")) as page:
         chosen = arm_and_accept(page, 1, 2)
-        page.get_by_label("Before each cut").click()
+        page.get_by_label("Preview before each cut").click()
         page.wait_for_selector('#start[title^="A preview is required"]', timeout=20_000)
         asked(page, robot)
         page.click("#approve-preview")

@@ -35,7 +35,7 @@ def test_a_recording_has_a_frame_and_a_name_and_no_control_of_a_robot(page: Page
     expect(page).to_have_title("row.mcap – Rolling Panda")
     border = page.locator("body").evaluate("each => getComputedStyle(each).borderTopWidth")
     assert border == "4px"
-    for name in ("Stop", "Start", "Arm", "Pause work", "Survey", "Take control", "Acknowledge", "Home"):
+    for name in ("Stop", "Start", "Arm", "Pause work", "Survey", "Take control", "I've checked", "Home"):
         expect(page.get_by_role("button", name=re.compile(rf"^{name}\b")).locator("visible=true")).to_have_count(0)
     for part in ("#stop", "rp-bar", "rp-lease", "rp-alarms", '[data-tab="drive"]'):
         expect(page.locator(part)).to_be_hidden()

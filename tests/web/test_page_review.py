@@ -170,7 +170,7 @@ def test_a_press_decides_and_the_next_one_to_decide_comes_by_itself(page: Page, 
     looking_at(page, "place-1-3")
     expect(review.locator(".review-done")).to_have_count(0)
     page.keyboard.press("r")
-    expect(page.locator(".review-done")).to_have_text("All is decided: 3 to cut, 3 left.")
+    expect(page.locator(".review-done")).to_have_text("All is decided: 3 to cut, 3 to leave.")
     left = [body for path, body in server.posted if path == "/api/sites/leave"]
     assert left == [{"vine": 1, "spur": spur, "left": True} for spur in (4, 3)]
 

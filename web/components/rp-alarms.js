@@ -135,7 +135,6 @@ function newRow(reason) {
 
 /** @param {Step} step */
 function labelOf(step) {
-  if (step === "Acknowledge") return text("bar.checked");
   if (step === "continue") return text("command.Resume");
   if (step === "calibration") return text("command.UseCamera");
   return COMMANDS.some((each) => each === step) ? text(`command.${step}`) : text(`bar.to_${step}`);

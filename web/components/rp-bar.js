@@ -16,7 +16,7 @@ import { icon } from "../js/views/icons.js";
 import { menu } from "../js/views/menu.js";
 
 /** @typedef {import("../js/control/commands.js").Step} Step */
-/** @typedef {{ box: HTMLElement, button: HTMLButtonElement, label: HTMLElement }} StepButton */
+/** @typedef {{ box: HTMLElement, button: HTMLButtonElement, label: HTMLElement, duration: HTMLElement }} StepButton */
 
 /** @type {readonly Step[]} */
 const STEPS = Object.freeze([...COMMANDS, "continue", "review", "preview", "approve", "reset"]);
@@ -72,10 +72,11 @@ class RpBar extends HTMLElement {
   /** @param {Step} name */
   add(name) {
     const label = element("span");
+    const duration = element("span", { class: "duration" });
     const id = isCommand(name) ? name.toLowerCase() : `to-${name}`;
-    const button = element("button", { id, onclick: () => take(name) }, icon(ICONS[name] ?? name), label);
+    const button = element("button", { id, onclick: () => take(name) }, icon(ICONS[name] ?? name), element("span", {}, label, duration));
     const box = element("div", { class: "step" }, button);
-    this.steps.set(name, { box, button, label });
+    this.steps.set(name, { box, button, label, duration });
     this.more.append(box);
   }
 
@@ -91,11 +92,12 @@ class RpBar extends HTMLElement {
       if (focused) wanted?.button.focus();
     }
     let left = 0;
-    for (const [name, { box, button, label }] of this.steps) {
+    for (const [name, { box, button, label, duration }] of this.steps) {
       const why = whyNotStep(name);
       const isNext = name === next;
       setEnabled(button, why, isCommand(name) ? text(`command.${name}.hint`) : "");
       setText(label, isNext ? labelOf(name) : isCommand(name) ? text(`command.${name}`) : "");
+      setText(duration, isNext && (name === "Start" || name === "continue") ? howLong() : "");
       button.classList.toggle("primary", isNext);
       box.hidden = !isNext && (!isCommand(name) || why !== null);
       left += Number(!isNext && !box.hidden);
@@ -117,13 +119,11 @@ async function fetchPreview() {
 function labelOf(step) {
   switch (step) {
     case "Start":
-      return countOf("ACCEPTED") > 0 ? counted("bar.start", countOf("ACCEPTED")) + howLong() : text("command.Start");
+      return countOf("ACCEPTED") > 0 ? counted("bar.start", countOf("ACCEPTED")) : text("command.Start");
     case "continue":
-      return counted("bar.resume", countOf("ACCEPTED")) + howLong();
+      return counted("bar.resume", countOf("ACCEPTED"));
     case "review":
       return counted("bar.review", countOf("PROPOSED"));
-    case "Acknowledge":
-      return text("bar.checked");
     case "preview":
     case "approve":
     case "reset":
@@ -133,8 +133,9 @@ function labelOf(step) {
   }
 }
 
+/** How long the accepted cuts take; empty where that is not known, or there is none. */
 function howLong() {
-  const seconds = timeLeft();
+  const seconds = countOf("ACCEPTED") > 0 ? timeLeft() : 0;
   // A line may end after the dot alone.
   return seconds ? `\u00a0· ${`~${durationWords(seconds)}`.replaceAll(" ", "\u00a0")}` : "";
 }

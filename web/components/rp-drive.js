@@ -161,5 +161,6 @@ function choice(name, chosen, choose, values) {
     drawOn([chosen], () => button.setAttribute("aria-pressed", String(chosen.get() === value)));
     return button;
   });
-  return element("div", { class: "choice", data: { choices: name }, attributes: { role: "group", "aria-label": text(`teleop.${name}`) } }, ...buttons);
+  const label = name === "axes" ? [element("span", { text: text("teleop.axes"), attributes: { "aria-hidden": "true" } })] : [];
+  return element("div", { class: "choice", data: { choices: name }, attributes: { role: "group", "aria-label": text(`teleop.${name}`) } }, ...label, ...buttons);
 }

@@ -5,7 +5,7 @@ import { PROCESSES } from "../js/link/messages.js";
 import { ageWords, dateWords, significant, spanWords } from "../js/state/format.js";
 import { isLive, isOpening, link, now, pageState, points, preview, processAge } from "../js/state/page-state.js";
 import { PANELS, arrangement, movePanel, placePanel, resetPanels, showPanel } from "../js/state/panels.js";
-import { partsOf, reasonText, severityOf } from "../js/state/reasons.js";
+import { capital, partsOf, reasonText, severityOf } from "../js/state/reasons.js";
 import { screen } from "../js/state/screens.js";
 import { drawOn, signal } from "../js/state/signals.js";
 import { counted, labelOf, text } from "../js/state/texts.js";
@@ -229,7 +229,7 @@ function processTable() {
   const rows = PROCESSES.map((process) => {
     const shape = element("span", { class: "shape" });
     const cells = ["version", "runs", "age"].map(() => element("td"));
-    const row = element("tr", { class: "presence", data: { process, present: "false" } }, element("th", { attributes: { scope: "row" } }, shape, labelOf(process)), ...cells);
+    const row = element("tr", { class: "presence", data: { process, present: "false" } }, element("th", { attributes: { scope: "row" } }, shape, capital(labelOf(process))), ...cells);
     body.append(row);
     return { process, row, shape, cells };
   });

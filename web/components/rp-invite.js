@@ -20,7 +20,6 @@ class RpInvite extends HTMLElement {
     this.hidden = true;
     const toggle = element("button", {
       id: "invite",
-      class: "quiet",
       text: text("invite.open"),
       attributes: { "aria-expanded": "false", "aria-controls": "invitation" },
     });

@@ -25,7 +25,7 @@ class RpLease extends HTMLElement {
     this.setAttribute("role", "group");
     this.setAttribute("aria-label", text("control.label"));
     const words = element("span", { class: "control-words", attributes: { role: "status" } });
-    this.append(words, this.give, this.request, this.take);
+    this.append(words, element("div", { class: "lease-buttons" }, this.give, this.request, this.take));
     drawOn([pageState], () => this.draw(words));
   }
 

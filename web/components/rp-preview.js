@@ -122,7 +122,7 @@ function wordsOf(state, at) {
   const approved = state.phase === "approved" ? `${text("preview.approved", { user: state.approved_by })} ` : "";
   if (cut) {
     const end = cut.reason ? text("preview.not_cut", { why: reasonText(cut.reason) }) : text("preview.cut");
-    return `${approved}${capital(pointNames(cut.point_id))}: ${end} · ${least([cut])}`;
+    return `${approved}${text("advice", { text: capital(pointNames(cut.point_id)), act: end })} · ${least([cut])}`;
   }
   const seconds = decimal(state.duration_s, 1);
   const done = state.cuts.filter((each) => each.cut_s !== null).length;

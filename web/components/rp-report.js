@@ -266,7 +266,7 @@ class RpReport extends HTMLElement {
  */
 function line(state, vine, spur, why) {
   const what = text(`report.left.${state}`);
-  return [`${text("report.place", { vine, spur })}: ${what}`, ...(why ? [reasonText(why)] : [])].join(" – ");
+  return [text("advice", { text: text("report.place", { vine, spur }), act: what }), ...(why ? [reasonText(why)] : [])].join(" – ");
 }
 
 /**

@@ -18,6 +18,7 @@ import {
   whyNotMove,
   whyNotReject,
 } from "../js/control/decisions.js";
+import { nextStep } from "../js/control/next-step.js";
 import { placePoint, placing, setPlacing, whyNoPlacing } from "../js/control/placing.js";
 import { changes, current, isOpen, itemOf, items, leavePlace, look, openAfter, step, whileSent } from "../js/control/review.js";
 import { isTyping } from "../js/control/stop.js";
@@ -242,9 +243,10 @@ class RpReview extends HTMLElement {
     setAttribute(this, "data-key", item.key);
     setAttribute(this, "data-pictured", this.pictured);
     setAttribute(this, "data-status", item.status);
+    setAttribute(this, "data-unknown", row && isUnknown(row) ? "yes" : "");
     const state = this.gone ? reasonText(reason("point_vanished")) : stateWords(item);
     setText(/** @type {Element} */ (this.state), state);
-    setText(/** @type {Element} */ (this.keeps), row ? keepsWords(row) : text("review.how"));
+    setText(/** @type {Element} */ (this.keeps), !row ? text("review.how") : isUnknown(row) ? text("review.ask_cut") : keepsWords(row));
     lines(/** @type {Element} */ (this.why), whyWords(item, this.pictured));
     setText(/** @type {Element} */ (this.robot), row ? [robotWords(row), planWords(row)].filter(Boolean).join(" ") : "");
     setText(/** @type {Element} */ (this.done), open === 0 && all.length > 0 ? finishedWords(all) : "");
@@ -516,7 +518,7 @@ function placeName({ vine, spur }) {
 function keepsWords({ point }) {
   const sure = point.confidence >= SURE ? "sure" : point.confidence >= FAIRLY ? "fairly" : "unsure";
   const what = text(`details.kind.${point.kind}`);
-  return [what, counted("review.keeps", point.nodes_kept), text(`review.${sure}`)].join(" · ");
+  return [what, counted("review.keeps", point.nodes_kept), text(`review.${sure}`)].join("\u00a0· ");
 }
 
 /**
@@ -557,7 +559,9 @@ function emptyWords(all) {
   const page = points.get();
   if (link.get().status !== "open") return text("queue.unknown");
   if (page === null || page.frames === 0) return text("queue.looking");
-  return [counted("queue.none", page.frames), ...noteWords()].join(" ");
+  const unseen = pageState.get()?.controller && ["Arm", "Survey"].includes(nextStep());
+  const told = unseen ? text("work.none") : counted("queue.none", page.frames);
+  return [told, ...noteWords()].join(" ");
 }
 
 /** What is undecided about no spur in particular. */

@@ -153,7 +153,7 @@ class RpRobots extends HTMLElement {
     const words = reasonText(alarm);
     if (path === location.pathname || this.told.get(name) === words) return;
     this.told.set(name, words);
-    if (severity) showToast(severity, `${name}: ${words}`);
+    if (severity) showToast(severity, text("advice", { text: name, act: words }));
   }
 }
 customElements.define("rp-robots", RpRobots);

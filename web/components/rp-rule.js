@@ -211,7 +211,7 @@ class RpRule extends HTMLElement {
     if (rule === null) return;
     const why = whyNothingOf("perception");
     const words = ruleWords(this.applied ?? held ?? rule);
-    setText(this.summary, this.draft ? text("rule.tried", { rule: words }) : words);
+    setText(this.summary, text(this.draft ? "rule.tried" : "rule.held", { rule: words }));
     for (const input of this.systems) {
       if (input.checked !== (input.value === rule.system)) input.checked = input.value === rule.system;
       setEnabled(input, why);

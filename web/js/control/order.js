@@ -25,7 +25,7 @@ function orderedBy() {
 export function orderWords() {
   const rows = workOrder();
   const beyond = countOf("UNREACHABLE");
-  const more = beyond > 0 ? ` · ${text("order.beyond", { count: beyond })}` : "";
+  const more = beyond > 0 ? ` · ${counted("work.beyond", beyond)}` : "";
   if (rows.length === 0) return text(beyond > 0 ? "order.none_left" : "order.none_accepted") + more;
   const plan = points.get()?.plan;
   const long = plan?.state === "valid" ? `, ${durationWords(plan.duration_s)}` : "";

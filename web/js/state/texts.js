@@ -42,7 +42,12 @@ const PLURALS = new Intl.PluralRules(LANGUAGE);
  * @param {Readonly<Record<string, string|number>>} [values] By their names in the text.
  */
 export function text(key, values = {}) {
-  return (TEXTS[key] ?? key).replace(/\{(\w+)\}/g, (_, name) => String(values[name] ?? "?"));
+  return joined((TEXTS[key] ?? key).replace(/\{(\w+)\}/g, (_, name) => String(values[name] ?? "?")));
+}
+
+/** Words in which no line ends between a number and its unit, or begins with a dot. @param {string} words */
+export function joined(words) {
+  return words.replace(/(?<=\d) (?=(?:mm|m|ms|s|min|h|%|Hz)(?![\p{L}\d]))|(?<=ω) | (?=· )/gu, "\u00a0");
 }
 
 /**
@@ -82,7 +87,7 @@ export function labelOf(names) {
 
 /** @param {string} name */
 function label(name) {
-  const [, kind = name, number = ""] = /^(.*?)( ?\d+)$/.exec(name) ?? [];
+  const [, kind = name, number = ""] = /^(.*?) ?(\d+)$/.exec(name) ?? [];
   const family = FAMILIES.find((each) => `${each}.${kind}` in TEXTS);
-  return family ? `${TEXTS[`${family}.${kind}`]}${number}` : name;
+  return family ? `${TEXTS[`${family}.${kind}`]}${number && "\u00a0"}${number}` : name;
 }

@@ -47,7 +47,7 @@ function built() {
   const made = sheet(
     "help",
     text("help.title"),
-    element("table", { class: "keys" }, element("tbody", {}, ...rows)),
+    element("table", { class: "keys keyboard" }, element("tbody", {}, ...rows)),
     element("div", { class: "help-more" }, guide, again),
   );
   again.addEventListener("click", () => {
