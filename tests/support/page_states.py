@@ -61,7 +61,7 @@ def _starting(page: Page, server: PlayedServer) -> None:
 
 
 def _no_points(page: Page, server: PlayedServer) -> None:
-    show_mode(page, server, controller("IDLE", reason="the program has just started"))
+    show_mode(page, server, controller("IDLE", reason=reasons.controller_started()))
     server.undecided_sites = ()
     show(server)
     open_screen(page, "review")
@@ -176,18 +176,18 @@ def _unknown_cut(page: Page, server: PlayedServer) -> None:
 
 def _running(page: Page, server: PlayedServer) -> None:
     working(page, server)
-    state = controller("AUTO", phase="APPROACH", active_point_id="p1", reason="p1: drive and reach, 2.4 s to go")
+    state = controller("AUTO", phase="APPROACH", active_point_id="p1", reason=reasons.command_by("Start", "Ada"))
     show_mode(page, server, msgspec.structs.replace(state, joint_margin=0.05, position_error=0.02))
 
 
 def _survey(page: Page, server: PlayedServer) -> None:
     working(page, server)
-    show_mode(page, server, controller("AUTO", phase="SURVEY", reason="survey: 1.8 m of 4.0 m"))
+    show_mode(page, server, controller("AUTO", phase="SURVEY", reason=reasons.command_by("Survey", "Ada")))
 
 
 def _paused(page: Page, server: PlayedServer) -> None:
     working(page, server)
-    show_mode(page, server, controller("PAUSED", reason="nobody has looked at the robot for 2.0 s"))
+    show_mode(page, server, controller("PAUSED", reason=reasons.unwatched(2.0, 1.5)))
 
 
 def _preview(page: Page, server: PlayedServer) -> None:
@@ -268,13 +268,13 @@ def _stopped(page: Page, server: PlayedServer) -> None:
     )
     server.stopped = (StopState(process="bridge", stops=records), StopState(process="controller", stops=records))
     server.bridge = bridge(stop_id="s1", stopped_by=reasons.software_stop("Ada", said("stop button")))
-    show_mode(page, server, controller("ESTOP_LATCHED", reason="stopped by Ada: stop button"))
+    show_mode(page, server, controller("ESTOP_LATCHED", reason=reasons.software_stop("Ada", said("stop button"))))
     expect(page.locator("rp-stop-banner")).to_be_visible()
 
 
 def _fault(page: Page, server: PlayedServer) -> None:
     working(page, server)
-    state = controller("FAULT", reason="the ledger cannot be written: no space left on the disk")
+    state = controller("FAULT", reason=reasons.ledger_silent(6.0))
     show_mode(page, server, msgspec.structs.replace(state, allowed={"Acknowledge": None}))
 
 
@@ -282,7 +282,7 @@ def _alarms(page: Page, server: PlayedServer) -> None:
     working(page, server)
     show(server, point(1, "UNKNOWN"), *queue()[1:])
     server.bridge = bridge(cutter="jammed", real_time_factor=0.5)
-    show_mode(page, server, controller("PROTECTIVE_STOP", reason="joint 4 follows 12° behind what it was sent"))
+    show_mode(page, server, controller("PROTECTIVE_STOP", reason=reasons.tracking_error("joint 4", 0.21, 0.15)))
     expect(page.locator("#alarms li")).to_have_count(4)
 
 
@@ -335,7 +335,7 @@ def _help(page: Page, server: PlayedServer) -> None:
 
 def _refused(page: Page, server: PlayedServer) -> None:
     working(page, server)
-    server.answers["/api/points/p3/accept"] = (409, {"ok": False, "reason": "p3 moved by 6 mm since you looked at it"})
+    server.answers["/api/points/p3/accept"] = (409, outcome(False, reasons.point_revised("p3", 1, 2)))
     open_screen(page, "review")
     choose(page, "p3")
     page.locator("#review-accept").click()
@@ -345,17 +345,17 @@ def _refused(page: Page, server: PlayedServer) -> None:
 def a_timeline(began: float = MORNING) -> Timeline:
     """Ten minutes of work with cuts, a pause, a stop and a refusal."""
     lines: list[tuple[float, m.Reason]] = [
-        (5.0, reasons.mode_changed("IDLE", "READY", said("armed by Ada"))),
+        (5.0, reasons.mode_changed("IDLE", "READY", reasons.command_by("Arm", "Ada"))),
         (40.0, reasons.command_refused("Bob", "start", reasons.control_held("Ada"))),
-        (60.0, reasons.mode_changed("READY", "AUTO", said("started by Ada"))),
+        (60.0, reasons.mode_changed("READY", "AUTO", reasons.command_by("Start", "Ada"))),
         *((70.0 + 12.0 * n, reasons.cut_done(f"p{n}", reasons.cut_and_gone())) for n in range(12)),
         (220.0, reasons.cut_ended("p20", reasons.stands_not_cut(reasons.cutter_missed()))),
         (230.0, reasons.robot_halted("AUTO", "PAUSED", said("a person beside the row"))),
-        (300.0, reasons.mode_changed("PAUSED", "READY", said("resumed by Ada"))),
-        (310.0, reasons.mode_changed("READY", "AUTO", said("started by Ada"))),
+        (300.0, reasons.mode_changed("PAUSED", "READY", reasons.command_by("Resume", "Ada"))),
+        (310.0, reasons.mode_changed("READY", "AUTO", reasons.command_by("Start", "Ada"))),
         *((325.0 + 14.0 * n, reasons.cut_done(f"p{30 + n}", reasons.cut_and_gone())) for n in range(8)),
         (450.0, reasons.robot_halted("AUTO", "ESTOP_LATCHED", said("stop button"))),
-        (520.0, reasons.mode_changed("ESTOP_LATCHED", "IDLE", said("reset by Ada"))),
+        (520.0, reasons.mode_changed("ESTOP_LATCHED", "IDLE", reasons.command_by("Reset", "Ada"))),
     ]
     builder = TimelineBuilder()
     for at, reason in lines:

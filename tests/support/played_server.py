@@ -56,13 +56,15 @@ def _refused(mode: m.Mode) -> dict[str, m.Reason]:
     return {name: reasons.wrong_mode(name, "PAUSED", mode) for name in (*COMMAND_NAMES, HOLD)}
 
 
-def controller(mode: m.Mode = "READY", reason: str = "armed by Ada", **changes: Any) -> m.ControllerState:
+def controller(
+    mode: m.Mode = "READY", reason: str | m.Reason = reasons.command_by("Arm", "Ada"), **changes: Any
+) -> m.ControllerState:
     points = ("AcceptPoint", "RejectPoint", "ReconsiderPoint", "ResolvePoint", "JudgeCut", "AcceptAll")
     state = m.ControllerState(
         header=m.Header(),
         mode=mode,
         phase="",
-        reason=said(reason),
+        reason=said(reason) if isinstance(reason, str) else reason,
         allowed=_refused(mode) | dict.fromkeys((*ALLOWED.get(mode, ()), *points)),
         of_holder=of_holder(mode),
         active_point_id="",

@@ -307,6 +307,8 @@ def test_says_what_it_waits_for_before_there_is_anything(tab: Page) -> None:
     expect(tab.locator("rp-review > .empty")).to_contain_text("No pruning point in 12 images so far")
     expect(tab.locator("#start")).to_be_disabled()
     expect(tab.locator("#stop")).to_be_enabled()
+    server.controller, server.gone = controller("IDLE"), {}
+    expect(tab.locator("rp-review > .empty")).to_contain_text("press Arm, then Survey")
 
 
 def test_the_sign_in_link_is_used_once_and_leaves_the_address(tab: Page) -> None:

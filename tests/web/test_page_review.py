@@ -285,6 +285,7 @@ def test_a_held_key_and_a_second_press_at_once_decide_once(page: Page, server: D
 def test_a_cut_of_unknown_outcome_is_answered_by_who_has_looked(page: Page, server: DecidingServer) -> None:
     show(server, point(1, "UNKNOWN", cut_id="c1"), point(2, "UNKNOWN", spur=2, cut_id="c2"))
     looking_at(page, "p1")
+    expect(page.locator(".review-keeps")).to_have_text("Look at the vine: is this cane cut?")
     expect(page.locator("#review-accept")).to_have_text("It is cut")
     page.locator("#review-accept").click()
     until(page, lambda: server.posted == [("/api/points/p1/resolve", {"outcome": "DONE", "reason": "seen by eye"})])
