@@ -56,9 +56,10 @@ def _refused(mode: m.Mode) -> dict[str, m.Reason]:
     return {name: reasons.wrong_mode(name, "PAUSED", mode) for name in (*COMMAND_NAMES, HOLD)}
 
 
-def controller(
-    mode: m.Mode = "READY", reason: str | m.Reason = reasons.command_by("Arm", "Ada"), **changes: Any
-) -> m.ControllerState:
+ARMED = reasons.command_by("Arm", "Ada")
+
+
+def controller(mode: m.Mode = "READY", reason: str | m.Reason = ARMED, **changes: Any) -> m.ControllerState:
     points = ("AcceptPoint", "RejectPoint", "ReconsiderPoint", "ResolvePoint", "JudgeCut", "AcceptAll")
     state = m.ControllerState(
         header=m.Header(),

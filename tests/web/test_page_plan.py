@@ -45,7 +45,7 @@ def server() -> PlayedServer:
 def test_what_the_plan_says_of_a_cut_is_told_or_why_it_refuses_it(page: Page) -> None:
     review = choose(page, "p1")
     expect(review.locator(".review-robot")).to_have_text(
-        "Cut no. 2 of the work: 3.1 s, 122 mm between link5 and camera."
+        "Cut no. 2 of the work: 3.1 s, 122 mm between link 5 and camera."
     )
     review = choose(page, "p2")
     expect(review.locator(".review-why")).to_contain_text("No posture of the arm reaches it")

@@ -30,7 +30,7 @@ def test_a_step_of_a_rules_slider_says_what_it_would_change_and_changes_nothing(
     page: Page, server: PlayedServer
 ) -> None:
     server.answers["/api/rule/what-if"] = (200, {"ok": True, "reason": WORDS})
-    expect(page.locator("rp-rule summary")).to_have_text("Spur · 2 buds · ≥ 6 mm · 20 mm past")
+    expect(page.locator("rp-rule summary")).to_have_text("Rule: Spur · 2 buds · ≥ 6 mm · 20 mm past")
     page.locator("rp-rule summary").click()
     expect(page.locator("#rule-fruiting_nodes")).to_be_hidden()
     page.locator("#rule-offset").focus()
@@ -68,10 +68,12 @@ def test_an_applied_rule_is_taken_back_with_its_acceptances_by_undo(page: Page, 
     )
     server.tell(server.page_points())
     expect(choose(page, "p2").locator(".review-why")).to_contain_text("The rule is now: Spur, buds kept: 2")
-    expect(page.locator("rp-rule summary")).to_have_text("Spur · 2 buds · ≥ 6 mm · 25 mm past")
+    expect(page.locator("rp-rule summary")).to_have_text("Rule: Spur · 2 buds · ≥ 6 mm · 25 mm past")
     expect(page.locator("#rule-apply")).to_be_hidden()
     undo = page.locator("#undo")
-    expect(undo).to_have_attribute("title", "Take back: the rule Spur · 2 buds · ≥ 6 mm · 25 mm past (Z)")
+    expect(undo).to_have_attribute(
+        "title", "Take back: the rule Spur\u00a0· 2 buds\u00a0· ≥ 6\u00a0mm\u00a0· 25\u00a0mm past (Z)"
+    )
     undo.click()
     until(page, lambda: of(server, "/api/rule/undo") == [ASKED])
     server.rule, server.points = m.PruningRule(), (first, second, third)

@@ -92,7 +92,7 @@ def test_it_says_how_long_and_how_near_and_the_scrubber_shows_moments(page: Page
     expect(page.locator(".preview-player")).to_be_hidden()
     told(server)
     words = page.locator(".preview-words")
-    expect(words).to_have_text("2 of 3 cuts in 10.0 s · least 62 mm link5–camera · ω 0.067 · joints 34°")
+    expect(words).to_have_text("2 of 3 cuts in 10.0 s · least 62 mm link 5–camera · ω 0.067 · joints 34°")
     slider = page.get_by_label("Moment of the preview")
     slider.fill("2")
     until(page, lambda: 2.0 in moments(server))

@@ -115,14 +115,14 @@ def test_it_sums_up_and_tells_who_accepted_what_was_refused_and_what_is_left(pag
     assert [sum_of(page, name) for name in ("done", "unknown", "called_wrong", "mean", "refused")] == [
         "3", "1", "1", "4.8", "1",
     ]  # fmt: skip
-    assert sum_of(page, "user") == "Ada, Bob" and sum_of(page, "duration") == "1 h 6 min"
+    assert sum_of(page, "user") == "Ada, Bob" and sum_of(page, "duration") == "1\u00a0h 6\u00a0min"
     assert "2027" in sum_of(page, "date")
     expect(page.locator(".left-over li")).to_have_text(
         [
-            re.compile(r"Vine 1 · spur 2: look whether it was cut – "),
-            re.compile(r"Vine 1 · spur 3: out of the robot's reach – "),
+            re.compile(r"Vine 1\s· spur 2: look whether it was cut – "),
+            re.compile(r"Vine 1\s· spur 3: out of the robot's reach – "),
             "Vine 2 · spur 5: no decision yet",
-            re.compile(r"Vine 1 · spur 4: decide by eye – "),
+            re.compile(r"Vine 1\s· spur 4: decide by eye – "),
         ]
     )
     expect(page.locator('[data-section="refusals"] tbody tr')).to_contain_text(["Bob"])

@@ -471,7 +471,7 @@ def test_where_the_robot_would_stand_is_told(page: Page, server: DecidingServer)
     mark(page, "p2").click()
     expect(page.locator(".review-robot")).to_have_text(
         "The robot stands 0.9 m from it, with the row on its left and the cut 0.3 m ahead. "
-        "Cut no. 2 of the work: 5.0 s, 60 mm between link5 and camera."
+        "Cut no. 2 of the work: 5.0 s, 60 mm between link 5 and camera."
     )
 
 

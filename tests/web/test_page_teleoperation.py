@@ -333,7 +333,7 @@ def test_a_posture_that_the_controller_refuses_is_not_gone_to(page: Page, server
     state_with_postures(server)
     begin(page, "Postures")
     page.get_by_role("button", name="Over the wire", exact=True).click()
-    expect(page.locator(".drive-foot .hint")).to_contain_text("3 mm would be between link6 and post 2")
+    expect(page.locator(".drive-foot .hint")).to_contain_text("3 mm would be between link 6 and post 2")
     expect(page.locator("#go")).to_be_disabled()
     assert holds(server) == []
 
