@@ -121,7 +121,8 @@ function needs() {
       places > 0 ? counted("work.places", places) : "",
       countOf("UNREACHABLE") > 0 ? counted("work.beyond", countOf("UNREACHABLE")) : "",
     ].filter(Boolean);
-    const words = all.length > 0 ? all.join(" · ") : text("work.nothing");
+    // A line ends between two of them alone.
+    const words = all.length > 0 ? all.map((each) => each.replaceAll(" ", "\u00a0")).join("\u00a0· ") : text("work.nothing");
     link.classList.toggle("calm", all.length === 0);
     setText(link, words);
     link.title = words;
