@@ -21,7 +21,7 @@ def screen() -> str:
 
 
 def shown(page: Page, chart: str) -> str:
-    return page.locator(f'[data-chart="{chart}"] .chart-value').inner_text()
+    return page.locator(f'[data-chart="{chart}"] .chart-value').inner_text().replace("\u00a0", " ")
 
 
 def inked(page: Page, chart: str) -> int:

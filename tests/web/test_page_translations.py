@@ -95,7 +95,7 @@ def test_numbers_and_reasons_are_in_the_language_of_the_browser(browser: Browser
     }"""
     values = [["age_s", 0.5], ["limit_s", 0.25]]
     told = page.evaluate(shown, {"code": "joints_stale", "values": values})
-    assert told == "Die Gelenkzustände sind 0,50\u00a0s alt; die Grenze ist 0,25\u00a0s"
+    assert told == "Die Gelenkzustände sind 0,50 s alt; die Grenze ist 0,25 s"
     for others, words in ((1, "mit 1 weiteren Rute ab"), (2, "mit 2 weiteren Ruten ab")):
         assert words in page.evaluate(shown, {"code": "renewal_cut", "values": [["others", others]]})
     (row,) = server.points[2:]

@@ -4,7 +4,7 @@ import { aim, goal } from "../js/control/posture-goal.js";
 import { ask } from "../js/link/api.js";
 import { pageState } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
-import { text } from "../js/state/texts.js";
+import { joined, text } from "../js/state/texts.js";
 import { element, setAttribute } from "../js/views/dom.js";
 
 /** Longest name that the controller takes. */
@@ -40,7 +40,7 @@ class RpPostures extends HTMLElement {
       }
       const chosen = goal.get()?.name;
       for (const button of list.querySelectorAll(".posture")) {
-        setAttribute(button, "aria-pressed", String(button.textContent === chosen));
+        setAttribute(button, "aria-pressed", String(button.textContent === joined(chosen ?? "")));
       }
     });
   }

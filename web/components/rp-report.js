@@ -8,7 +8,7 @@ import { points } from "../js/state/page-state.js";
 import { reasonText } from "../js/state/reasons.js";
 import { screen } from "../js/state/screens.js";
 import { drawOn } from "../js/state/signals.js";
-import { counted, labelOf, text } from "../js/state/texts.js";
+import { counted, joined, labelOf, text } from "../js/state/texts.js";
 import { dropDown, element, setEnabled, setText } from "../js/views/dom.js";
 import { icon } from "../js/views/icons.js";
 import { RpTimeline } from "./rp-timeline.js";
@@ -253,7 +253,7 @@ class RpReport extends HTMLElement {
       .map((site) => line("undecided", site.vine, site.spur, site.reason));
     const lines = [...rows, ...sites];
     const words = lines.length > 0 ? lines : [text("report.none.left")];
-    if (words.join("\n") === [...this.left.children].map((item) => item.textContent).join("\n")) return;
+    if (words.map(joined).join("\n") === [...this.left.children].map((item) => item.textContent).join("\n")) return;
     this.left.replaceChildren(...words.map((each) => element("li", { text: each })));
   }
 }

@@ -28,7 +28,7 @@ import { fetchPicture } from "../js/link/pictures.js";
 import { link, now, pageState, points, showToast, staleWords } from "../js/state/page-state.js";
 import { reason, reasonText } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
-import { counted, labelOf, text } from "../js/state/texts.js";
+import { counted, joined, labelOf, text } from "../js/state/texts.js";
 import { element, setAttribute, setEnabled, setText } from "../js/views/dom.js";
 import { icon } from "../js/views/icons.js";
 import { setStatus } from "../js/views/point-status.js";
@@ -574,7 +574,7 @@ function noteWords() {
  * @param {readonly string[]} words
  */
 function lines(box, words) {
-  if (box.textContent === words.join("") && box.childElementCount === words.length) return;
+  if (box.textContent === words.map(joined).join("") && box.childElementCount === words.length) return;
   box.replaceChildren(...words.map((each) => element("p", { text: each })));
 }
 customElements.define("rp-review", RpReview);

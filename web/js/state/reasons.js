@@ -2,7 +2,7 @@
 
 import { decimal, significant } from "./format.js";
 import { pointNames } from "./point-names.js";
-import { REASONS, isOne, joined, labelOf, text } from "./texts.js";
+import { REASONS, isOne, labelOf, text } from "./texts.js";
 
 /** @typedef {{code: string, values: readonly (readonly [string, string|number|Reason])[]}} Reason */
 
@@ -56,7 +56,7 @@ export function partsOf({ code, values = [] }) {
     if (place === value) return shown(value, format ?? "");
     return at === 0 ? capital(String(place)) : String(place);
   });
-  return { text: joined(told), act };
+  return { text: told, act };
 }
 
 /**

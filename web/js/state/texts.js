@@ -42,7 +42,7 @@ const PLURALS = new Intl.PluralRules(LANGUAGE);
  * @param {Readonly<Record<string, string|number>>} [values] By their names in the text.
  */
 export function text(key, values = {}) {
-  return joined((TEXTS[key] ?? key).replace(/\{(\w+)\}/g, (_, name) => String(values[name] ?? "?")));
+  return (TEXTS[key] ?? key).replace(/\{(\w+)\}/g, (_, name) => String(values[name] ?? "?"));
 }
 
 /** Words in which no line ends between a number and its unit, or begins with a dot. @param {string} words */

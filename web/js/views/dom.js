@@ -1,7 +1,7 @@
 // Building DOM elements without markup strings, so that no text can become markup.
 
 import { reasonText } from "../state/reasons.js";
-import { text } from "../state/texts.js";
+import { joined, text } from "../state/texts.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 
@@ -26,7 +26,7 @@ export function element(tag, traits = {}, ...children) {
   const node = document.createElement(tag);
   if (traits.id) node.id = traits.id;
   if (traits.class) node.className = traits.class;
-  if (traits.text !== undefined) node.textContent = traits.text;
+  if (traits.text !== undefined) node.textContent = joined(traits.text);
   // A button submits its form only where it says so.
   if (node instanceof HTMLButtonElement) node.type = "button";
   for (const [name, value] of Object.entries(traits.data ?? {})) node.dataset[name] = value;
@@ -79,7 +79,8 @@ export function fillTexts(page) {
  * @param {string} words
  */
 export function setText(node, words) {
-  if (node.textContent !== words) node.textContent = words;
+  const shown = joined(words);
+  if (node.textContent !== shown) node.textContent = shown;
 }
 
 /**
