@@ -201,9 +201,12 @@ def test_on_a_telephone_a_screen_has_one_scroller(page: Page, server: PlayedServ
     assert page.evaluate(scrollers) == ["rp-work"]
 
 
-def test_on_a_telephone_the_controls_that_drive_are_in_sight(page: Page, server: PlayedServer) -> None:
+@pytest.mark.parametrize("language", ["en", "de", "es"])
+def test_on_a_telephone_the_controls_that_drive_are_in_sight(page: Page, server: PlayedServer, language: str) -> None:
     page.set_viewport_size({"width": 390, "height": 844})
+    page.evaluate("language => localStorage.setItem('setting.language', language)", language)
     for state, needed in {"base": "#drive-pad", "tool": ".arrows button", "joints": ".joint button"}.items():
+        page.reload()
         STATES[f"teleoperate-{state}"](page, server)
         screen, control = box_of(page.locator("rp-drive")), box_of(page.locator(needed).first)
         foot = page.locator(".drive-foot")

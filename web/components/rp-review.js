@@ -518,7 +518,9 @@ function placeName({ vine, spur }) {
 function keepsWords({ point }) {
   const sure = point.confidence >= SURE ? "sure" : point.confidence >= FAIRLY ? "fairly" : "unsure";
   const what = text(`details.kind.${point.kind}`);
-  return [what, counted("review.keeps", point.nodes_kept), text(`review.${sure}`)].join("\u00a0· ");
+  const parts = [what, counted("review.keeps", point.nodes_kept), text(`review.${sure}`)];
+  // A line ends between two of them alone.
+  return parts.map((each) => each.replaceAll(" ", "\u00a0")).join("\u00a0· ");
 }
 
 /**
