@@ -47,7 +47,7 @@ export function text(key, values = {}) {
 
 /** Words in which no line ends between a number and its unit, or begins with a dot. @param {string} words */
 export function joined(words) {
-  return words.replace(/(?<=\d) (?=(?:mm|m|ms|s|min|h|%|Hz)(?![\p{L}\d]))|(?<=ω) | (?=· )/gu, "\u00a0");
+  return words.replace(/(?<=\d) (?=(?:mm|m|ms|s|min|h|%|Hz)(?![\p{L}\d]))|(?<=[ω≥]) | (?=· )/gu, "\u00a0");
 }
 
 /**
