@@ -1,9 +1,9 @@
-"""Contact: external torques of the arm, less what is no touch, against limits; and what was probably touched.
+"""Contact detection by the arm's external torques, and an estimate of what was touched.
 
-The arm's estimate of external torques has offsets, and it takes the base's acceleration and tilt for touch. So the
-torque by the base's acceleration is taken away, and a slow average. What remains is judged in every period by the force
-at the tool that explains it, and joint by joint. When a limit is passed, the place is searched: the spot of the robot
-at which one force explains the torques of all joints, and the known obstacle that is there.
+The arm's estimate of external torques has offsets. It also contains the torques of the base's acceleration and tilt.
+The monitor subtracts the torque of the base's acceleration and a slow average. It compares the rest with limits in
+every period: the force at the tool that explains it, and the torque of each joint. When a limit is passed, it looks for
+the spot of the robot at which one force explains all torques, and for the known obstacle there.
 """
 
 import math

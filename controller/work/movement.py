@@ -131,7 +131,7 @@ class Movement:
         self._homing = Homing(self._config, self.body.follower, self.body.dt)
 
     def back_off(self) -> None:
-        """Begin to go back from what was touched, once the robot is at rest."""
+        """Plan the way back after a contact; it begins when the robot is at rest."""
         self._backs_off, self._back_off, self._rested = self._config.contact.back_off > 0.0, None, 0
 
     def stay(self) -> None:

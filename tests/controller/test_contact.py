@@ -1,11 +1,11 @@
-"""What the controller makes of external torques: is something touched, where, and what is it probably?"""
+"""Contact detection: whether the arm touches something, where, and what it probably is."""
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
 from controller.config import ContactConfig, ControllerConfig
-from controller.motion.contact import ContactMonitor
+from controller.motion.contact import ContactMonitor, Spots
 from controller.whole_body.obstacle import Obstacle
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
@@ -66,6 +66,26 @@ def test_a_push_beyond_the_limit_is_a_contact_of_that_force(force):
     assert touch.reason.code == "touched_unknown"
 
 
+def test_a_force_at_the_tool_beyond_its_limit_is_a_contact_where_no_joint_is_beyond_its_own():
+    """The force's limit counts by itself: with a short lever about every joint the torques stay small."""
+    limits, rng, tried = (
+        np.array([LIMITS.stop_torque] * 4 + [LIMITS.stop_torque_wrist] * 3),
+        np.random.default_rng(1),
+        0,
+    )
+    for direction in rng.normal(size=(200, 3)):
+        arm = Arm()
+        torque = arm.by(1.15 * LIMITS.stop_force * direction / np.linalg.norm(direction))
+        if (np.abs(torque) > 0.95 * limits).any():
+            continue
+        arm.tell(np.zeros(7), 5)
+        found = arm.tell(torque)
+        if found.force > LIMITS.stop_force:
+            tried += 1
+            assert found.touch is not None
+    assert tried > 0
+
+
 def test_at_rest_the_robot_is_touched_but_touches_nothing_and_what_presses_then_counts_as_none():
     arm = Arm()
     arm.tell(np.zeros(7), 50)
@@ -100,7 +120,7 @@ def test_the_acceleration_of_the_base_is_no_touch():
 
 def places(rng, count=60):
     """Postures with a spot of the arm that something pushes hard from a direction that the arm feels."""
-    spots = ContactMonitor(LIMITS, ROBOT)._spots
+    spots = Spots(ROBOT)
     far = [k for k, part in enumerate(spots.parts) if part not in ("link1", "link2", "link3")]
     for _ in range(count):
         q = HOME.copy()

@@ -6,7 +6,7 @@ import { ask, fetchJson } from "../js/link/api.js";
 import { dateWords, decimal } from "../js/state/format.js";
 import { link, now, pageState } from "../js/state/page-state.js";
 import { reason, reasonText } from "../js/state/reasons.js";
-import { screen } from "../js/state/screens.js";
+import { screen, whileOpen } from "../js/state/screens.js";
 import { drawOn, signal } from "../js/state/signals.js";
 import { counted, text } from "../js/state/texts.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
@@ -20,7 +20,6 @@ const DEGREE = Math.PI / 180;
 const ROWS = /** @type {const} */ (["used", "seen", "offer"]);
 
 class RpCalibration extends HTMLElement {
-  timer = 0;
   camera = signal(/** @type {CameraState|null} */ (null));
 
   connectedCallback() {
@@ -33,7 +32,7 @@ class RpCalibration extends HTMLElement {
     const calibrate = button("calibrate-camera", "CalibrateCamera", () => void ask(text("command.CalibrateCamera"), "api/camera/calibrate"));
     const use = button("use-camera", "UseCamera", () => take("calibration"));
     this.append(list, element("div", { class: "buttons" }, check, calibrate, use));
-    drawOn([screen], () => this.follow());
+    whileOpen("engineer", AGAIN_MS, async () => this.camera.set((await fetchJson("api/camera")) ?? this.camera.get()));
     drawOn([this.camera, pageState, link, now], () => {
       if (screen.get() !== "engineer") return;
       const camera = this.camera.get();
@@ -42,14 +41,6 @@ class RpCalibration extends HTMLElement {
       setEnabled(calibrate, whyNot("CalibrateCamera"), text("calibration.calibrate_hint"));
       setEnabled(use, whyNot("UseCamera") ?? (camera?.offer ? null : reason("no_calibration_offered")), text("calibration.use_hint"));
     });
-  }
-
-  follow() {
-    window.clearInterval(this.timer);
-    if (screen.get() !== "engineer") return;
-    const fetchAll = async () => this.camera.set((await fetchJson("api/camera")) ?? this.camera.get());
-    void fetchAll();
-    this.timer = window.setInterval(() => void fetchAll(), AGAIN_MS);
   }
 }
 

@@ -6,7 +6,7 @@ import { ageWords, dateWords, significant, spanWords } from "../js/state/format.
 import { isLive, isOpening, link, now, pageState, points, preview, processAge } from "../js/state/page-state.js";
 import { PANELS, arrangement, movePanel, placePanel, resetPanels, showPanel } from "../js/state/panels.js";
 import { capital, partsOf, reasonText, severityOf } from "../js/state/reasons.js";
-import { screen } from "../js/state/screens.js";
+import { screen, whileOpen } from "../js/state/screens.js";
 import { drawOn, signal } from "../js/state/signals.js";
 import { counted, labelOf, text } from "../js/state/texts.js";
 import { alarms } from "../js/views/alarms.js";
@@ -30,7 +30,6 @@ const LATE_S = 2;
 const diagnostics = signal(/** @type {Diagnostics|null} */ (null));
 
 class RpEngineer extends HTMLElement {
-  timer = 0;
   charts = new RpCharts();
   /** @type {Map<PanelName, HTMLElement>} */
   panels = new Map();
@@ -59,17 +58,8 @@ class RpEngineer extends HTMLElement {
       this.append(panel);
     }
     drawOn([arrangement], () => this.arrange());
-    drawOn([screen], () => this.follow());
-  }
-
-  follow() {
-    window.clearInterval(this.timer);
-    const open = screen.get() === "engineer";
-    this.charts.open(open);
-    if (!open) return;
-    const fetchAll = async () => diagnostics.set((await fetchJson("api/diagnostics")) ?? diagnostics.get());
-    void fetchAll();
-    this.timer = window.setInterval(() => void fetchAll(), AGAIN_MS);
+    drawOn([screen], () => this.charts.open(screen.get() === "engineer"));
+    whileOpen("engineer", AGAIN_MS, async () => diagnostics.set((await fetchJson("api/diagnostics")) ?? diagnostics.get()));
   }
 
   /**

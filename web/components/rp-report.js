@@ -6,7 +6,7 @@ import { reasonIn } from "../js/link/api.js";
 import { clockWords, dateWords, decimal, spanWords } from "../js/state/format.js";
 import { points } from "../js/state/page-state.js";
 import { reasonText } from "../js/state/reasons.js";
-import { screen } from "../js/state/screens.js";
+import { screen, whileOpen } from "../js/state/screens.js";
 import { drawOn } from "../js/state/signals.js";
 import { counted, joined, labelOf, text } from "../js/state/texts.js";
 import { dropDown, element, setEnabled, setText } from "../js/views/dom.js";
@@ -25,7 +25,6 @@ const PICTURES_MS = 15_000;
 const OUTCOMES = Object.freeze(["DONE", "FAILED_NOT_CUT", "UNKNOWN", "wrong"]);
 
 class RpReport extends HTMLElement {
-  timer = 0;
   words = element("p", { class: "hint", attributes: { role: "status" } });
   facts = element("dl", { class: "session" });
   sums = element("dl", { class: "sums number" });
@@ -68,18 +67,9 @@ class RpReport extends HTMLElement {
       this.control.box,
     );
     for (const filter of [this.vine, this.outcome]) filter.addEventListener("change", () => this.filter());
-    drawOn([screen], () => this.follow());
+    drawOn([screen], () => this.timeline.open(screen.get() === "report"));
+    whileOpen("report", AGAIN_MS, () => this.fetch());
     drawOn([points], () => this.drawLeft());
-  }
-
-  /** Fetch while the screen is open. */
-  follow() {
-    window.clearInterval(this.timer);
-    const open = screen.get() === "report";
-    this.timeline.open(open);
-    if (!open) return;
-    void this.fetch();
-    this.timer = window.setInterval(() => void this.fetch(), AGAIN_MS);
   }
 
   async fetch() {

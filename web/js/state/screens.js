@@ -1,7 +1,7 @@
 // The screens of the page, one for each job. The hash of the address names the open one.
 
 import { pageState } from "./page-state.js";
-import { signal } from "./signals.js";
+import { drawOn, signal } from "./signals.js";
 
 /** @typedef {"work"|"review"|"drive"|"report"|"engineer"} ScreenName */
 
@@ -19,6 +19,23 @@ function named() {
 export function openScreen(name) {
   if (name !== screen.get()) location.hash = name;
   screen.set(name);
+}
+
+/**
+ * Fetch at once and again in each period, for as long as a screen is open.
+ *
+ * @param {ScreenName} name
+ * @param {number} period In ms.
+ * @param {() => unknown} fetchAll
+ */
+export function whileOpen(name, period, fetchAll) {
+  let timer = 0;
+  drawOn([screen], () => {
+    window.clearInterval(timer);
+    if (screen.get() !== name) return;
+    fetchAll();
+    timer = window.setInterval(fetchAll, period);
+  });
 }
 
 /** Follow the address. Where it names no screen, the robot's first state says which opens. */

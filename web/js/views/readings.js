@@ -90,7 +90,7 @@ export const READINGS = Object.freeze([
     fullScale: 30,
     // As `light_force` of the controller's configuration.
     warnAbove: 8,
-    format: (/** @type {number} */ value) => value.toFixed(0),
+    format: (/** @type {number} */ value) => decimal(value, 0),
     read: (/** @type {PageState} */ state) => state.controller?.tool_force ?? null,
   },
   {
