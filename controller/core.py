@@ -344,13 +344,15 @@ class Controller:
         return self._begin(asked, now, self._movement.sequence.start)
 
     def _survey(self, asked: intents.Survey, now: float) -> m.Reason | None:
-        return self._begin(asked, now, functools.partial(self._movement.sequence.survey, asked.distance))
+        survey = functools.partial(self._movement.sequence.survey, asked.distance)
+        return self._movement.home_refused() or self._begin(asked, now, survey)
 
     def _look_again(self, asked: intents.LookAgain, now: float) -> m.Reason | None:
         place = open_place(self._queue.perceived, asked.vine, asked.spur)
         if place is None:
             return reasons.site_unknown(asked.vine, asked.spur)
-        return self._begin(asked, now, functools.partial(self._movement.sequence.survey, place=place))
+        survey = functools.partial(self._movement.sequence.survey, place=place)
+        return self._movement.home_refused() or self._begin(asked, now, survey)
 
     def _look_around(self, prefix: str, asked: intents.Start, now: float) -> m.Reason | None:
         return self._begin(asked, now, functools.partial(self._movement.look_around, prefix))
@@ -371,10 +373,13 @@ class Controller:
         self._event_log.log(stopped)
         return None
 
-    def _home(self, asked: intents.Home, now: float) -> None:
+    def _home(self, asked: intents.Home, now: float) -> m.Reason | None:
+        if (refused := self._movement.home_refused()) is not None:
+            return refused
         self._change_mode(asked, now)
         self._movement.go_home()
         self._supervisor.remark(reasons.homing_arm())
+        return None
 
     def _being_worked_on(self, point_id: str) -> m.Reason | None:
         return reasons.point_worked_on(point_id) if point_id == self._movement.sequence.active else None

@@ -2364,6 +2364,11 @@ def posture_touches(distance_mm: float, part: str, other: str, needed_mm: float)
     """In this posture {distance_mm:.0f} mm would be between {part} and {other}, {needed_mm:.0f} mm are needed."""
 
 
+@_reason("warning", "choose another place for the tool")
+def tool_inside(part: str, other: str, depth_mm: float) -> None:
+    """There {part} would be {depth_mm:.0f} mm inside {other}."""
+
+
 # Work: motions and cuts
 
 

@@ -21,8 +21,8 @@ _LOOK = 0.05
 _GROW, _GROWTHS, _CUTS = 0.5, 400, 40
 #: Postures (joints 2 to 7) with the arm folded over its base, as intermediate goals.
 _TUCKS = np.array([[-0.785, 0.0, -2.356, 0.0, 1.571, 0.785], [-1.2, 0.0, -2.7, 0.0, 1.9, 0.785]])
-#: A start below the clearance may come this much nearer while the arm leaves (m).
-_GIVE, _ESCAPES = 0.001, 300
+#: A start below the clearance comes nearer by this at most (m) while the arm leaves, checked in such steps (rad).
+_GIVE, _FINE, _ESCAPES = 0.0002, 0.01, 300
 
 
 @dataclass(frozen=True)
@@ -90,13 +90,13 @@ class ArmPathPlanner:
             yield [start, here, there, goal]
 
     def _escape(self, place: Array, start: Array, near: float, rng: np.random.Generator) -> Array | None:
-        """The nearest of random postures that is clear, and gets clear without coming noticeably nearer first."""
+        """The nearest of random postures that is clear, and gets clear without coming nearer first."""
         sizes = np.linspace(0.05, 1.5, _ESCAPES)
         for size in sizes:
             out: Array = np.clip(start + size * rng.uniform(-1.0, 1.0, 7), self._limits.lower, self._limits.upper)
             if self._least(place, out)[0] < self._limits.clearance + 0.005:
                 continue
-            if self._free(place, start, out, near - _GIVE):
+            if self._free(place, start, out, near - _GIVE, _FINE):
                 return out
         return None
 
@@ -152,9 +152,9 @@ class ArmPathPlanner:
                 way = [*way[: i + 1], a, b, *way[j + 1 :]]
         return way
 
-    def _free(self, place: Array, a: Array, b: Array, least: float | None = None) -> bool:
+    def _free(self, place: Array, a: Array, b: Array, least: float | None = None, look: float = _LOOK) -> bool:
         """Whether the straight line from a to b is free. It checks the middle first, where most collisions are."""
-        count = int(np.ceil(float(np.abs(b - a).max()) / _LOOK))
+        count = int(np.ceil(float(np.abs(b - a).max()) / look))
         needed = self._limits.clearance if least is None else least
         for fraction in _halving(count):
             if self._least(place, a + fraction * (b - a))[0] < needed:

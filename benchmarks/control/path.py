@@ -26,6 +26,8 @@ _ROUND = (0.75, 1.1, 1.6)
 _OUTLINE = (-0.523, 0.190, 0.290)
 #: Number of base motions that are tried between two poses.
 _WAYS = 2
+#: A start that is too near counts as left without coming nearer if it comes nearer by this at most (m).
+_ROUNDING = 0.0002
 #: Largest undershoot of the clearance between two checked rows (m).
 _BETWEEN = 0.005
 
@@ -175,7 +177,7 @@ class PathPlanner:
     def _first_contact(self, plan: Plan) -> Clearance | None:
         """First row of the motion that is too near to an obstacle; None without one. Skips rows that cannot collide.
 
-        A start that is too near may come 2 mm nearer while it leaves.
+        A start that is too near comes no nearer while it leaves.
         """
         travel, row, last = plan.travel(), 0, len(plan.t) - 1
         needed = self._limits.clearance - _BETWEEN
@@ -184,7 +186,7 @@ class PathPlanner:
         while True:
             least = self._collision.least(plan.q[row])
             been_clear = been_clear or least.distance >= needed
-            if least.distance < (needed if been_clear else min(needed, start - 0.002)):
+            if least.distance < (needed if been_clear else min(needed, start - _ROUNDING)):
                 return least
             if row == last:
                 return None

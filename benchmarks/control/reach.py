@@ -106,6 +106,8 @@ def summarise(rows: Sequence[Row]) -> dict[str, Any]:
         "omega_least": round(min(quality.omega_least for quality in moved), 4),
         "joint_margin_rad_least": round(min(quality.margin_least for quality in moved), 4),
         "clearance_m_least": round(min(quality.clearance_least for quality in moved), 4),
+        "clearance_m_least_at_a_start": round(min(quality.clearance_start for quality in moved), 4),
+        "clearance_m_lost": round(max(quality.clearance_lost for quality in moved), 4),
         "infeasible_ticks": sum(row.infeasible_ticks for row in rows),
         "planning_ms_mean": round(1e3 * float(np.mean([row.planned_s for row in rows])), 1),
     }
@@ -121,6 +123,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--targets", type=Path, metavar="FILE", help="targets as JSON; without it they are drawn")
     parser.add_argument("--seed", type=int, default=0, help="of drawn targets and of the planner (default: 0)")
     parser.add_argument("--count", type=int, default=100, help="targets to draw (default: 100)")
+    parser.add_argument(
+        "--starts", choices=("survey", "anywhere"), default="survey", help="posture of drawn starts (default: survey)"
+    )
     parser.add_argument("--free-axis", choices=("none", "tool_y"), default="none", help="of drawn targets")
     parser.add_argument("--method", choices=METHODS, default="hierarchy", help="(default: hierarchy)")
     parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), help="processes (default: all cores)")
@@ -134,7 +139,7 @@ def _run(arguments: argparse.Namespace) -> int:
     targets = (
         reach_targets.read(arguments.targets)
         if arguments.targets is not None
-        else reach_targets.draw(arguments.seed, arguments.count, arguments.free_axis)
+        else reach_targets.draw(arguments.seed, arguments.count, arguments.free_axis, arguments.starts == "anywhere")
     )
     for path in (arguments.trajectories, arguments.json.parent if arguments.json is not None else None):
         if path is not None:
@@ -229,7 +234,10 @@ def _print(method: str, rows: Sequence[Row], summary: dict[str, Any], seconds: f
     print(f"  base travel                  {summary['base_travel_m_mean']} m mean")
     print(f"  ω of the arm                 {summary['omega_mean']} mean, {summary['omega_least']} least")
     print(f"  joint margin                 {summary['joint_margin_rad_least']} rad least")
-    print(f"  clearance                    {summary['clearance_m_least']} m least")
+    print(
+        f"  clearance                    {summary['clearance_m_least']} m least, at a start "
+        f"{summary['clearance_m_least_at_a_start']} m; at most {summary['clearance_m_lost']} m below start or margin"
+    )
     print(f"  infeasible ticks             {summary['infeasible_ticks']}")
     print(f"  planning                     {summary['planning_ms_mean']} ms mean")
     failed = [row for row in rows if not row.quality.reached]

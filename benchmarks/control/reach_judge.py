@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from controller.config import HierarchyConfig
 from controller.motion.follower import tool_error
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.manipulability import arm_omega
@@ -13,6 +14,8 @@ from rolling_panda.model.robot import ARM_Q, RobotModel
 
 #: A goal counts as reached within these (m, rad).
 POSITION, ROTATION = 1e-3, np.radians(0.5)
+#: Distance that the controller keeps (m).
+KEPT = HierarchyConfig().collision_distance
 #: Rows between two looks at the distances.
 _LOOK = 5
 #: What finite differences of rounded numbers may be above a limit.
@@ -72,6 +75,7 @@ class Quality:
         omega_least: Least one.
         margin_least: Least distance to a joint limit (rad).
         clearance_least: Least distance between the robot's parts and from the ground (m), looked at every fifth row.
+        clearance_start: The same at the start (m).
     """
 
     reached: bool
@@ -85,6 +89,12 @@ class Quality:
     omega_least: float
     margin_least: float
     clearance_least: float
+    clearance_start: float
+
+    @property
+    def clearance_lost(self) -> float:
+        """How far the clearance went below that of the start, or below the kept one where that is less (m)."""
+        return min(self.clearance_start, KEPT) - self.clearance_least
 
 
 def judge(
@@ -107,6 +117,7 @@ def judge(
         omega_mean=float(np.mean(omega)),
         omega_least=float(np.min(omega)),
         margin_least=float(margin.min()),
+        clearance_start=collision.least(q[0]).distance,
         clearance_least=min(collision.least(row).distance for row in [*q[::_LOOK], q[-1]]),
     )
 

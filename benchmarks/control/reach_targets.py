@@ -12,8 +12,9 @@ from msgspec import Meta, Struct
 
 from benchmarks.control.arm_ik import ArmIk
 from rolling_panda.errors import InputError
+from rolling_panda.messages.supervision import ArmAngles
 from rolling_panda.model.differential_drive import Array
-from rolling_panda.model.robot import ARM_Q
+from rolling_panda.model.robot import ARM_Q, RobotModel
 
 Number = Annotated[float, Meta(ge=-1e3, le=1e3)]
 FreeAxis = Literal["none", "tool_y"]
@@ -21,6 +22,10 @@ FreeAxis = Literal["none", "tool_y"]
 HOME = (-0.2784, -0.1128, -0.0354, -2.0055, 1.6759, 1.2124, -0.269)
 #: Drawn goals: x and y (m) either way, z (m), tilt of the tool's z from horizontal (rad) either way.
 _SIDE, _HEIGHTS, _TILT = 4.0, (0.4, 1.5), np.radians(40.0)
+
+
+#: Joints of starts anywhere (rad).
+_LOWER, _UPPER = RobotModel().limits.lower[ARM_Q], RobotModel().limits.upper[ARM_Q]
 
 
 class Start(Struct, frozen=True, forbid_unknown_fields=True):
@@ -91,12 +96,12 @@ def write(path: Path, targets: tuple[Target, ...]) -> None:
     path.write_bytes(msgspec.json.format(msgspec.json.encode(_File(targets)), indent=1) + b"\n")
 
 
-def draw(seed: int, count: int, free_axis: FreeAxis) -> tuple[Target, ...]:
-    """Goals anywhere around a base at the origin, the arm in its survey posture.
+def draw(seed: int, count: int, free_axis: FreeAxis, anywhere: bool = False) -> tuple[Target, ...]:
+    """Goals anywhere around a base at the origin, the arm in its survey posture, or anywhere within its limits.
 
     x and y are within 4 m, z is 0.4 to 1.5 m; the approach axis (tool z) has any yaw and is tilted up to 40° from
     horizontal either way, and the roll about it is any. Nothing is left out, so that some goals without a free axis are
-    beyond what the arm can reach from anywhere.
+    beyond what the arm can reach from anywhere. Of starts anywhere many are in collision with themselves.
     """
     rng = np.random.default_rng(seed)
     targets = []
@@ -107,7 +112,8 @@ def draw(seed: int, count: int, free_axis: FreeAxis) -> tuple[Target, ...]:
         R = pin.rpy.rpyToMatrix(0.0, np.pi / 2 - tilt, yaw) @ pin.rpy.rpyToMatrix(0.0, 0.0, roll)
         quaternion = tuple(float(v) for v in pin.Quaternion(R).coeffs())
         goal = msgspec.convert({"position": tuple(map(float, position)), "quat_xyzw": quaternion}, Goal)
-        targets.append(Target(Start((0.0, 0.0, 0.0), HOME), goal, free_axis))
+        arm = msgspec.convert(rng.uniform(_LOWER, _UPPER).tolist(), ArmAngles) if anywhere else HOME
+        targets.append(Target(Start((0.0, 0.0, 0.0), arm), goal, free_axis))
     return tuple(targets)
 
 

@@ -53,6 +53,7 @@ class Teleoperation:
         drive: DifferentialDrive,
         dt: float,
         refusal: Callable[[Array, Array], Reason | None],
+        tool_refusal: Callable[[Any, Any], Reason | None],
     ) -> None:
         """Bind the parts for a control period of `dt` (s).
 
@@ -63,11 +64,13 @@ class Teleoperation:
             drive: Geometry of the base.
             dt: Control period (s).
             refusal: Why the arm cannot go to a posture (7, rad) from a configuration (12); None if it can.
+            tool_refusal: Why the tool cannot go to a pose from another one (pin.SE3 both); None if it can.
         """
         self._config, self._follower, self._drive = config, follower, drive
-        self._dt, self._refusal = dt, refusal
+        self._dt, self._refusal, self._tool_refusal = dt, refusal, tool_refusal
         self._course: _Course | None = None
         self._checked: ArmAngles | None = None
+        self._goal_checked = False
         self._posture: Array = np.concatenate([[0.0, 0.0, work.row_heading, 0.0, 0.0], work.reach])
         self._newest: Received[TeleopTarget] | None = None
         self._message: TeleopTarget | None = None
@@ -81,6 +84,7 @@ class Teleoperation:
         if newest is None or not newest.message.hold or now - newest.at > self._config.hold_max_age_s:
             self.pressed = True
             self._course = self._checked = None
+            self._goal_checked = False
             return False
         message = newest.message
         if message is not self._message:
@@ -112,7 +116,13 @@ class Teleoperation:
         self.pressed = False
 
     def refused(self, robot: Measured) -> Reason | None:
-        """Why the arm cannot go to the held posture; None if it can, or if another motion is held."""
+        """Why the arm cannot go to the held posture, or the tool to the pose that a hold begins with; None if it can.
+
+        While a hold lasts, the tool slides along what its target is led into.
+        """
+        if self._goal is not None and not self._goal_checked:
+            self._goal_checked = True
+            return self._tool_refusal(self._goal, robot.kinematics.T_odom_tool)
         posture = None if self._message is None else self._message.posture
         if posture is None or posture == self._checked:
             return None

@@ -85,8 +85,15 @@ class Movement:
         )
         self.sequence = CutSequence(config, search, body.follower, body.saturation, queue, run_id, known, permit)
         self.posture_check = PostureCheck(RobotModel(robot_config), config.whole_body)
+        check = self.posture_check
         self.teleoperation = Teleoperation(
-            config.teleoperation, config.work, body.follower, body.robot.drive, body.dt, self.posture_check.refusal
+            config.teleoperation,
+            config.work,
+            body.follower,
+            body.robot.drive,
+            body.dt,
+            check.refusal,
+            check.tool_refusal,
         )
         model, home = RobotModel(robot_config), np.array(config.work.home)
         self._views = {views.prefix: view_postures(model, home, views) for views in (BOARD, ROW)}
@@ -125,6 +132,11 @@ class Movement:
     def look_around(self, prefix: str) -> None:
         """Begin to look at the calibration's board, or at the row, from several places."""
         self.sequence.look_around(prefix, self._views[prefix], self.posture_check.refusal)
+
+    def home_refused(self) -> m.Reason | None:
+        """Why the arm cannot be in its survey posture where the base stands; None if it can, or if that is unknown."""
+        robot = self.body.measured
+        return None if robot is None else self.posture_check.refusal(np.array(self._config.work.home), robot.q)
 
     def go_home(self) -> None:
         """Begin to bring the arm home."""

@@ -1,4 +1,6 @@
-"""Saved postures of the arm: named by people, kept in the ledger, and checked before the arm goes to one."""
+"""Saved postures of the arm: named by people, kept in the ledger. Goals are checked before the arm goes to one."""
+
+from typing import Any
 
 import numpy as np
 
@@ -7,6 +9,8 @@ from controller.ledger.journal import Journal, PostureRow
 from controller.motion.body import Body
 from controller.motion.surroundings import Surroundings
 from controller.whole_body.collision import CollisionModel
+from controller.whole_body.collision_geometry import GROUND, TOOL
+from controller.whole_body.obstacle import Axes
 from rolling_panda import commands as intents
 from rolling_panda import reasons
 from rolling_panda.commands import Handlers
@@ -21,8 +25,14 @@ from rolling_panda.transport.inbox import Received
 MOST, LONGEST = 20, 40
 
 
+#: The tool is deeper inside something than it is now by more than this (m).
+_DEEPER = 0.001
+#: Distance of the spheres that stand for a part of the tool (m).
+_APART = 0.005
+
+
 class PostureCheck:
-    """Whether the arm can be in a posture where the base stands. It has its own robot model."""
+    """Whether arm or tool can be somewhere while the base stands where it does. It has its own robot model."""
 
     def __init__(self, robot: RobotModel, config: WholeBodyConfig) -> None:
         """Nothing is known to stand around yet."""
@@ -31,6 +41,7 @@ class PostureCheck:
         self._low = limits.lower[ARM_Q] + config.joint_margin
         self._high = limits.upper[ARM_Q] - config.joint_margin
         self._surroundings = Surroundings(CollisionModel(robot))
+        self._spheres = _tool_spheres(robot, self._surroundings.model)
 
     def update(self, obstacles: Received[Obstacles] | None) -> None:
         """Take the newest message; one that was taken before costs nothing."""
@@ -54,6 +65,45 @@ class PostureCheck:
             if distance < settings.kept(pair):
                 return reasons.posture_touches(1e3 * distance, *pair, 1e3 * settings.kept(pair))
         return None
+
+    def tool_refusal(self, goal: Any, now: Any) -> Reason | None:
+        """Why the tool cannot go to a pose, whatever the posture: it would be inside something; None if it can.
+
+        Canes do not count, as they give way, nor does something that the tool is as deep in already.
+
+        Args:
+            goal: T_odom_tool wanted (pin.SE3).
+            now: T_odom_tool measured (pin.SE3).
+        """
+        parts, centers, radii = self._spheres
+        obstacles = [each for each in self._surroundings.model.obstacles if each.kind != "cane"]
+        axes, others = Axes(tuple(obstacles)), (GROUND, *(each.name for each in obstacles))
+        there, here = (
+            np.column_stack([points[:, 2] - radii, axes.gaps(points, radii)])
+            for points in (centers @ T.rotation.T + T.translation for T in (goal, now))
+        )
+        inside = np.where(there < np.minimum(here, 0.0) - _DEEPER, there, 0.0)
+        row, column = np.unravel_index(int(inside.argmin()), inside.shape)
+        if inside[row, column] == 0.0:
+            return None
+        return reasons.tool_inside(parts[row], others[column], -1e3 * float(inside[row, column]))
+
+
+def _tool_spheres(robot: RobotModel, model: CollisionModel) -> tuple[tuple[str, ...], Array, Array]:
+    """Spheres that fill the tool's capsules: part, middle in the tool's frame (n×3, m) and radius of each (n, m)."""
+    q, shapes = np.zeros(12), model.shapes
+    T_tool_odom = robot.pose(q, robot.tool_id).inverse()
+    parts: list[str] = []
+    centers, radii = list[Array](), list[float]()
+    for part, half, around, placed in zip(shapes.parts, shapes.half, shapes.around, model.placed(q), strict=True):
+        if part not in TOOL:
+            continue
+        axis, middle = placed[:9].reshape(3, 3)[:, 2], placed[9:]
+        for along in np.linspace(-half[2], half[2], max(2, int(2.0 * half[2] / _APART) + 1)):
+            parts.append(part)
+            centers.append(T_tool_odom.act(middle + along * axis))
+            radii.append(float(around))
+    return tuple(parts), np.array(centers), np.array(radii)
 
 
 class Postures:

@@ -144,7 +144,7 @@ def test_silence_ends_the_hold():
 
 def test_a_demand_that_comes_late_or_twice_counts_for_nothing():
     teleoperation, age = (
-        Teleoperation(CONFIG.teleoperation, CONFIG.work, None, None, 0.01, lambda *_: None),
+        Teleoperation(CONFIG.teleoperation, CONFIG.work, None, None, 0.01, lambda *_: None, lambda *_: None),
         CONFIG.teleoperation.hold_max_age_s,
     )
 
@@ -398,6 +398,56 @@ def test_a_posture_beside_wood_is_refused_and_one_in_the_open_is_not():
     r.run(0.2)
     answer = r.ask(intents.CheckPosture(user="ada", angles=CONFIG.work.home))
     assert not answer.ok and answer.reason.code == "posture_touches" and "post 0" in text_of(answer.reason)
+
+
+@pytest.mark.parametrize(("lift", "other"), [(-1.0, "ground"), (0.0, "post 0")])
+def test_a_hold_that_begins_with_the_tool_inside_something_moves_nothing_and_says_why(lift, other):
+    r = robot()
+    x, y, z = tool(r).translation
+    r.obstacles = (Capsule("post", (x + 0.4, y, 0.0), (x + 0.4, y, 2.0), 0.04, 0.04),)
+    r.run(0.2)
+    before = r.q.copy()
+    hold(r, moved(tool(r), 0.4 if lift == 0.0 else 0.1, 0.0, lift))
+    r.run(0.5)
+    assert r.q == pytest.approx(before, abs=1e-6) and r.state.mode == "READY"
+    (why,) = [event for event in r.events if "inside" in event]
+    assert other in why
+
+
+def test_a_tool_led_on_into_a_post_slides_and_one_that_stands_in_something_may_leave_it():
+    r = robot()
+    x, y, z = tool(r).translation
+    r.obstacles = (Capsule("post", (x + 0.4, y, 0.0), (x + 0.4, y, 2.0), 0.04, 0.04),)
+    r.run(0.2)
+    hold(r, moved(tool(r), 0.1, 0.0, 0.0))
+    r.run(0.3)
+    hold(r, moved(tool(r), 0.4, 0.0, 0.0))
+    r.run(0.5)
+    assert r.state.mode == "TELEOP"
+    r.teleop = None
+    r.run(0.5)
+    x, y, z = tool(r).translation
+    r.obstacles = (Capsule("post", (x + 0.01, y, 0.0), (x + 0.01, y, 2.0), 0.04, 0.04),)
+    r.run(0.2)
+    hold(r, moved(tool(r), -0.2, 0.0, 0.0))
+    r.run(0.5)
+    assert r.state.mode == "TELEOP"
+
+
+@pytest.mark.parametrize("asked", [intents.Home(user="ada"), intents.Survey(user="ada", distance=1.0)])
+def test_a_survey_posture_inside_a_post_is_refused_before_anything_moves(asked):
+    r = KinematicRobot(Controller(CONFIG, RobotConfig()), CONFIG.work.folded)
+    at_home = np.concatenate([np.zeros(5), CONFIG.work.home])
+    x, y, _ = r.model.kinematics(at_home).T_odom_tool.translation
+    r.obstacles = (Capsule("post", (x, y, 0.0), (x, y, 2.0), 0.04, 0.04),)
+    r.run(0.2)
+    assert r.ask(intents.Arm(user="ada")).ok
+    r.run(0.1)
+    before = r.q.copy()
+    answer = r.ask(asked)
+    assert not answer.ok and answer.reason.code == "posture_touches" and "post 0" in text_of(answer.reason)
+    r.run(1.0)
+    assert r.q == pytest.approx(before, abs=1e-6) and r.state.mode == "READY"
 
 
 def test_the_programs_own_postures_can_be_taken_and_reached():

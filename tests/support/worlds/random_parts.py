@@ -119,7 +119,7 @@ class Movement:
         self.sequence = Sequence(config, queue, run_id, self.chance, permit)
         follower = SimpleNamespace(jog=lambda xi, robot: SimpleNamespace(xi=np.clip(xi, -0.03, 0.03)))
         self.teleoperation = Teleoperation(
-            config.teleoperation, config.work, follower, MODEL.drive, 0.01, lambda *_: None
+            config.teleoperation, config.work, follower, MODEL.drive, 0.01, lambda *_: None, lambda *_: None
         )
         self.posture_check = SimpleNamespace(refusal=lambda *_: None)
         self.tracking, self._home, self._back = None, 0, 0
@@ -139,6 +139,9 @@ class Movement:
     def update(self, inputs):
         if not self.at_rest and self.chance.random() < 0.002:
             self.body.contact.touch = Touch("cutter", "post 1", np.array([0.0, 40.0, 0.0]), np.zeros(3))
+
+    def home_refused(self):
+        return None
 
     def go_home(self):
         self._home = 30
