@@ -13,6 +13,10 @@ BENCHMARKS = {
     "tick": ("benchmarks.control.tick", "time of one control step"),
     "row": ("benchmarks.control.row", "cuts in simulated rows, end to end"),
     "world": ("benchmarks.control.world", "the same in a rough world: calibration, ground, wind, light, blades"),
+    "vine": (
+        "benchmarks.control.vine",
+        "a whole vine with a reviewer: seconds of machine and person, every cut judged",
+    ),
     "reach": ("benchmarks.control.reach", "tool poses anywhere around the robot: reached, limits, manipulability"),
     "arm": ("benchmarks.control.arm", "the arm alone between random poses, beside published figures"),
     "contact": (

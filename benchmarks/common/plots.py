@@ -17,6 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from benchmarks.common.intervals import share
+from benchmarks.control.vine_plot import draw_vine
 from benchmarks.control.world_plot import draw_world
 from benchmarks.peers.stopwatch import EDGES_US, counts
 from rolling_panda.errors import InputError
@@ -142,6 +143,7 @@ PICTURES: dict[str, Callable[[Path, Figure], None]] = {
     "omega_along_a_reach": _reach(omega_along),
     "tick": _tick,
     "world": draw_world,
+    "vine": draw_vine,
 }
 
 

@@ -6,7 +6,33 @@ from typing import Any
 
 import numpy as np
 
-from bridge.sim.vineyard.truth import SpurTruth
+from bridge.sim.vineyard.row import Array, Row
+from bridge.sim.vineyard.truth import RightCut, judge, judge_guyot
+from rolling_panda.messages.types import CutKind
+
+#: In place of a cane's number: the stub.
+STUB = -1
+
+
+@dataclass(frozen=True)
+class WantedCut:
+    """Wood of which something stays, and where it is cut.
+
+    Attributes:
+        vine: Vine along the row.
+        spur: Spur on the vine.
+        cane: Cane on the spur; `STUB` for the spur's own wood.
+        kind: What the cut is for.
+        cut: Where it is right; None where this wood stays as it is.
+        nodes: Middles of its count nodes, base first (N×3, m, world).
+    """
+
+    vine: int
+    spur: int
+    cane: int
+    kind: CutKind
+    cut: RightCut | None
+    nodes: Array
 
 
 @dataclass(frozen=True)
@@ -28,31 +54,50 @@ class TrueCut:
     past_best: float | None = None
 
 
-def true_cut(truths: Iterable[SpurTruth], pieces: Iterable[Mapping[str, Any]]) -> TrueCut:
+def wanted_cuts(row: Row, guyot: bool = False) -> tuple[WantedCut, ...]:
+    """The right cuts of a row before the first one: of spur-pruned vines, or of the spurs of Guyot vines."""
+    none, out = np.zeros((0, 3)), list[WantedCut]()
+    if not guyot:
+        for spur in judge(row):
+            place = spur.vine, spur.spur
+            out.append(WantedCut(*place, spur.keeper, "spur cut", spur.cut, spur.nodes))
+            out.append(WantedCut(*place, STUB, "renewal cut", spur.renewal, none))
+        return tuple(out)
+    for vine in judge_guyot(row):
+        canes: tuple[tuple[int, CutKind, RightCut | None], ...] = (
+            (vine.lower, "spur cut", vine.spur_cut),
+            (vine.upper, "cane cut", vine.cane_cut),
+        )
+        for cane, kind, cut in canes:
+            own = (rod for _, rod in row.standing() if (rod.vine, rod.spur, rod.cane) == (vine.vine, 0, cane))
+            middles = [rod.at(0.5)[0] for rod in own if rod.kind == "node"][1:]
+            out.append(WantedCut(vine.vine, 0, cane, kind, cut, np.array(middles).reshape(-1, 3)))
+        out.append(WantedCut(vine.vine, 0, STUB, "renewal cut", None, none))
+    return tuple(out)
+
+
+def true_cut(wanted: Iterable[WantedCut], pieces: Iterable[Mapping[str, Any]]) -> TrueCut:
     """Judge what one or more bites severed for a point.
 
     Args:
-        truths: Of the row before the first cut.
+        wanted: Of the row before the first cut.
         pieces: What was severed: vine, spur, cane, kind and point of each, as in the trace.
     """
-    known = {(truth.vine, truth.spur): truth for truth in truths}
+    known = {(each.vine, each.spur, each.cane): each for each in wanted}
     right, harm, cane, nodes, past = False, "", False, None, None
     for piece in pieces:
-        truth, place = known.get((piece["vine"], piece["spur"])), np.array(piece["point"])
-        if truth is None:
+        stub, place = piece["kind"] == "spur", np.array(piece["point"])
+        found = known.get((piece["vine"], piece["spur"], STUB if stub else piece["cane"]))
+        if found is None:
             continue
-        stub = piece["kind"] == "spur"
-        if not stub and piece["cane"] != truth.keeper:
-            continue
-        cut = truth.renewal if stub else truth.cut
-        if cut is not None:
-            cane, past = True, cut.past_best(place)
-            if not stub:
-                nodes = int(np.sum((truth.nodes - place) @ cut.tangent < 0.0))
-        name = f"vine {truth.vine}, spur {truth.spur}"
+        cut, name = found.cut, f"vine {found.vine}, spur {found.spur}"
         if cut is None:
             harm = f"{name}: the {'stub below the cane that stays' if stub else 'short cane that stays'} was cut"
-        elif float((place - cut.least) @ cut.tangent) < 0.0:
+            continue
+        cane, past = True, cut.past_best(place)
+        if not stub:
+            nodes = int(np.sum((found.nodes - place) @ cut.tangent < 0.0))
+        if float((place - cut.least) @ cut.tangent) < 0.0:
             harm = f"{name}: {'the cane' if stub else 'a node'} that stays was cut off"
         else:
             right = right or cut.past_most(place) <= 0.0

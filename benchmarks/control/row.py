@@ -3,13 +3,15 @@
 Several methods work on the same accepted points: a seed's row looks the same to each before the first cut.
 """
 
+import json
 import math
 import re
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -18,14 +20,14 @@ from msgspec.structs import replace
 
 from benchmarks.common.documents import bench_parser, write
 from benchmarks.control.cane_touches import Cane, CaneTouches
-from benchmarks.control.cut_truth import true_cut
+from benchmarks.control.cut_truth import WantedCut, true_cut, wanted_cuts
 from benchmarks.control.row_report import Cut, RowRun, mean_stages, summarise, tell, tell_stages
 from benchmarks.control.row_stages import StageClock
 from benchmarks.control.row_walk import walk
 from bridge.sim.robot import trace
 from bridge.sim.robot.robot import SimulatedRobot
 from bridge.sim.vineyard.row import Row
-from bridge.sim.vineyard.truth import judge, staying_rods
+from bridge.sim.vineyard.truth import staying_rods
 from bridge.sim.world.config import CALM, WorldConfig
 from controller.config import ControllerConfig
 from controller.motion.follower import Tracking
@@ -83,15 +85,15 @@ def cut_row(
         if loop.controller.mode == "AUTO":
             clock.note(loop, tracking)
             if len(errors) % _LOOK_EVERY == 0:
-                row = _row(loop)
+                row = row_of(loop)
                 touches.look(loop.configuration(), row.standing(), row.revision)
             errors.append(float(np.linalg.norm(loop.true_tool() - tracking.desired.translation)))
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "trace"
-        config = _config(Path(folder) / "row.toml", pictures, world)
+        config = sim_config(Path(folder) / "row.toml", pictures, world)
         with ClosedLoop(seed, path, config, method, watch, plans, looks, segmenter) as loop:
-            touches, truths = CaneTouches(staying_rods(_row(loop))), judge(_row(loop))
+            touches, wanted = CaneTouches(staying_rods(row_of(loop))), wanted_cuts(row_of(loop))
             warned = _check_camera(loop) if checked else ""
             accepted = [] if along else _accept(loop, points)
             begin, other_s = loop.now, 0.0
@@ -109,38 +111,11 @@ def cut_row(
             ends = {entry.point_id: entry for entry in loop.queue()}
             stops = sum("PROTECTIVE_STOP" in text_of(event.reason) for event in loop.events)
         record = trace.read(path)
-    events = {event["point_id"]: event for event in record.events if event["event"] == "cut"}
-    severed: dict[str, list[dict[str, Any]]] = {}
-    for bite in record.events:
-        severed.setdefault(bite.get("point_id", ""), []).extend(bite.get("severed", ()))
-    cuts = []
-    for entry in accepted:
-        event, where = events.get(entry.point_id), entry.accepted_position
-        assert where is not None
-        pieces = severed.get(entry.point_id, [])
-        end = ends.get(entry.point_id, replace(entry, state="PROPOSED", reason=reasons.no_longer_reported()))
-        truth = true_cut(truths, pieces)
-        cuts.append(
-            Cut(
-                method=method,
-                seed=seed,
-                point_id=entry.point_id,
-                state=end.state,
-                reason=_codes(end.reason),
-                distance=min((math.dist(piece["point"], where) for piece in pieces), default=None),
-                tool_error=None if event is None else math.dist(event["blade"], where),
-                duration_s=durations.get(entry.point_id, 0.0),
-                true_right=truth.right,
-                harm=truth.harm,
-                right_cane=truth.right_cane,
-                nodes_left=truth.nodes_left,
-                past_best=truth.past_best,
-            )
-        )
+    cuts = judged_cuts(method, seed, accepted, ends, wanted, record.events, durations)
     return RowRun(
         method=method,
         seed=seed,
-        cuts=tuple(cuts),
+        cuts=cuts,
         work_s=work_s,
         other_s=other_s,
         path_rms=math.sqrt(float(np.mean(np.square(errors)))) if errors else 0.0,
@@ -149,42 +124,100 @@ def cut_row(
         stops=stops,
         stages=clock.stages,
         limits=clock.limits,
-        canes_touched=_spared(touches, record.events),
-        staying_touched=_named(touches.touched_staying),
+        canes_touched=spared(touches, record.events),
+        staying_touched=named(touches.touched_staying),
         camera_warning=warned,
     )
 
 
-def _codes(reason: m.Reason | None) -> str:
+def judged_cuts(
+    method: str,
+    seed: int,
+    accepted: Sequence[m.QueueEntry],
+    ends: Mapping[str, m.QueueEntry],
+    wanted: Collection[WantedCut],
+    events: Sequence[dict[str, Any]],
+    durations: Mapping[str, float],
+) -> tuple[Cut, ...]:
+    """Judge accepted points.
+
+    Args:
+        method: Whole-body method.
+        seed: Of the row.
+        accepted: The points as they were accepted.
+        ends: What became of them; a point that is missing is no longer reported.
+        wanted: The right cuts of the row before the first one.
+        events: Of the trace.
+        durations: Seconds a point, as far as they are known.
+    """
+    bites = [event for event in events if event["event"] == "cut"]
+    last = {bite["point_id"]: bite for bite in bites}
+    cuts = []
+    for entry in accepted:
+        bite, where = last.get(entry.point_id), entry.accepted_position
+        assert where is not None
+        pieces = [piece for each in bites if each["point_id"] == entry.point_id for piece in each["severed"]]
+        end = ends.get(entry.point_id, replace(entry, state="PROPOSED", reason=reasons.no_longer_reported()))
+        truth = true_cut(wanted, pieces)
+        cuts.append(
+            Cut(
+                method=method,
+                seed=seed,
+                point_id=entry.point_id,
+                state=end.state,
+                reason=codes(end.reason),
+                distance=min((math.dist(piece["point"], where) for piece in pieces), default=None),
+                tool_error=None if bite is None else math.dist(bite["blade"], where),
+                duration_s=durations.get(entry.point_id, 0.0),
+                true_right=truth.right,
+                harm=truth.harm,
+                right_cane=truth.right_cane,
+                nodes_left=truth.nodes_left,
+                past_best=truth.past_best,
+            )
+        )
+    return tuple(cuts)
+
+
+def codes(reason: m.Reason | None) -> str:
     """Code of a reason, with the codes of those that it gives: `acceptance_void: other_cane`."""
     if reason is None:
         return ""
-    return ": ".join([reason.code, *(_codes(value) for _, value in reason.values if isinstance(value, m.Reason))])
+    return ": ".join([reason.code, *(codes(value) for _, value in reason.values if isinstance(value, m.Reason))])
 
 
-def _row(loop: ClosedLoop) -> Row:
+def row_of(loop: ClosedLoop) -> Row:
+    """The simulated row as it stands."""
     robot = loop.bridge.robot
     assert isinstance(robot, SimulatedRobot)
     return robot.row
 
 
-def _config(path: Path, pictures: float, world: WorldConfig) -> Path:
-    """The simulation's configuration with another rate of pictures and disturbances."""
+def sim_config(
+    path: Path, pictures: float, world: WorldConfig, settings: Mapping[str, Mapping[str, object]] = MappingProxyType({})
+) -> Path:
+    """Write the simulation's configuration with another rate of pictures, disturbances, and settings by section."""
     text = resource("assets/config/sim.toml").read_text(encoding="utf-8")
-    usual = re.compile(r"^camera_moving_hz = .*$", re.MULTILINE)
-    text = usual.sub(f"camera_moving_hz = {pictures}", text, count=1)
-    knobs = "\n".join(f"{key} = {value!r}" for key, value in asdict_of(world).items() if key != "preset")
-    path.write_text(text.replace('preset = "calm"', f'preset = "{world.preset}"\n{knobs}', 1), encoding="utf-8")
+    changes = {"bridge": {"camera_moving_hz": pictures}, "world": asdict_of(world), **settings}
+    for section, values in changes.items():
+        head, title, rest = text.partition(f"[{section}]\n")
+        body, following, tail = rest.partition("\n[")
+        for key, value in values.items():
+            body = re.sub(rf"^{key} = .*\n", "", body + "\n", count=1, flags=re.MULTILINE)
+            body = f"{key} = {json.dumps(value)}\n{body.rstrip()}"
+        text = head + title + body + following + tail
+    path.write_text(text, encoding="utf-8")
     return path
 
 
-def _spared(touches: CaneTouches, events: Sequence[dict[str, Any]]) -> dict[str, str]:
+def spared(touches: CaneTouches, events: Sequence[dict[str, Any]]) -> dict[str, str]:
     """What was touched, but for the canes that were cut."""
     cut = {(piece["vine"], piece["spur"], piece["cane"]) for event in events for piece in event.get("severed", ())}
-    return _named({cane: parts for cane, parts in touches.touched.items() if cane not in cut})
+    return named({cane: parts for cane, parts in touches.touched.items() if cane not in cut})
 
 
-def _named(touched: dict[Cane, set[str]]) -> dict[str, str]:
+def named(touched: dict[Cane, set[str]]) -> dict[str, str]:
+    """Canes by their words, and the parts that touched each."""
     return {
         f"vine {vine}, spur {spur}, cane {cane}": ", ".join(sorted(parts))
         for (vine, spur, cane), parts in sorted(touched.items())

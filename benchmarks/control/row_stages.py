@@ -13,7 +13,7 @@ from rolling_panda.model.robot import ARM_XI, RobotModel
 from tests.support.worlds.closed_loop import ClosedLoop
 
 #: Stages in the order of a cut.
-STAGES = ("standing", "transfer", "advance", "slow", "settle", "blades", "retreat")
+STAGES = ("standing", "transfer", "close-up", "advance", "slow", "settle", "blades", "retreat")
 #: What may hold the motion back; `plan` where it runs at the pace it was planned with.
 LIMITS = (
     "plan",
@@ -35,7 +35,7 @@ class StageClock:
     Attributes:
         config: Of the controller.
         stages: Seconds by stage.
-        limits: Seconds by limit, over transfer, advance, slow and retreat.
+        limits: Seconds by limit, over transfer, advance, slow and retreat; before a close-up the camera is waited for.
     """
 
     config: ControllerConfig
@@ -78,6 +78,8 @@ class StageClock:
             return "blades"
         if phase == "RETREAT":
             return "retreat"
+        if phase == "CLOSE_UP":
+            return "close-up"
         if phase != "ADVANCE" or state is None:
             return "transfer"
         if tracking.done:

@@ -382,6 +382,7 @@ class SimulatedRobot:
             "point_id": cutter.point_id,
             "outcome": cutter.outcome,
             "detail": text_of(cutter.detail),
+            "code": cutter.detail.code,
             "blade": tool[:3, 3].tolist(),
             "blade_normal": tool[:3, 1].tolist(),
             "severed": [

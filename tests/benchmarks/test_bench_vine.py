@@ -1,0 +1,296 @@
+"""The benchmark of a whole vine: how its reviewer decides, what it counts, what it refuses, and its picture."""
+
+import json
+from pathlib import Path
+from types import SimpleNamespace
+
+import msgspec
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from benchmarks.control import vine as bench
+from benchmarks.control.cut_truth import STUB, wanted_cuts
+from benchmarks.control.row_report import Cut
+from benchmarks.control.vine_plot import draw_vine
+from bridge.sim import build
+from bridge.sim.vineyard.config import VineyardConfig
+from bridge.sim.vineyard.grow import grow
+from bridge.sim.vineyard.row import Row
+from rolling_panda import commands as intents
+from rolling_panda import messages as m
+from rolling_panda import reasons
+from rolling_panda.errors import InputError
+from tests.support.points import point
+
+ROW = grow(VineyardConfig(vines=1), 3)
+WANTED = wanted_cuts(ROW)
+
+
+# --- the reviewer -----------------------------------------------------------------------------------------------------
+
+
+class Page:
+    """What a reviewer needs of a loop: points and places along a row that change as they are decided."""
+
+    def __init__(self, points, sites=(), refuses=(), changes=()):
+        self.now, self.points, self.sites = 0.0, {each.point_id: each for each in points}, list(sites)
+        self.states = dict.fromkeys(self.points, "PROPOSED")
+        self.refuses, self.changes, self.asked = refuses, list(changes), []
+        self.inbox = SimpleNamespace(newest=lambda kind: SimpleNamespace(message=self.shown()))
+        self.perception = SimpleNamespace(answer=self.leave)
+
+    def shown(self):
+        return m.PruningPoints(
+            header=m.Header(self.now, "odom"),
+            segmenter="none",
+            frames=1,
+            points=tuple(self.points.values()),
+            undecided_sites=tuple(self.sites),
+        )
+
+    def queue(self, *states):
+        return (
+            m.QueueEntry(point_id=name, state=state, accepted_position=self.points[name].position)
+            for name, state in self.states.items()
+            if state in states
+        )
+
+    def run(self, seconds):
+        self.now += seconds
+        if self.changes and self.now >= self.changes[0][0]:
+            _, name = self.changes.pop(0)
+            self.points[name] = msgspec.structs.replace(self.points[name], revision=self.points[name].revision + 1)
+
+    def command(self, asked):
+        self.asked.append((round(self.now, 1), asked))
+        if isinstance(asked, intents.AcceptAll):
+            sure = [name for name, each in self.points.items() if each.confidence >= asked.confidence]
+            self.states |= dict.fromkeys(sure, "ACCEPTED")
+            return m.Answer(ok=True)
+        if asked.point_id in self.refuses:
+            return m.Answer(ok=False, reason=reasons.point_unseen(asked.point_id))
+        assert asked.revision == self.points[asked.point_id].revision
+        self.states[asked.point_id] = "ACCEPTED"
+        return m.Answer(ok=True)
+
+    def leave(self, asked):
+        self.asked.append((round(self.now, 1), asked))
+        return m.Answer(ok=True)
+
+
+def at(name, vine, spur, **changes):
+    return point(name, (0.1 * spur, 0.75, 1.0), vine=vine, spur=spur, **changes)
+
+
+def place(spur, needs="operator"):
+    return m.UndecidedSite(reason=reasons.no_cane_followed(), needs=needs, vine=1, spur=spur)
+
+
+def told(page):
+    return [getattr(asked, "point_id", f"place {getattr(asked, 'spur', '')}") for _, asked in page.asked]
+
+
+def test_the_reviewer_goes_along_the_row_and_places_that_can_wait_come_last():
+    page = Page(
+        [at("c", 1, 4), at("a", 1, 1), at("b", 1, 2)], [place(3), place(1, "another look"), place(5, "nothing")]
+    )
+    reviewer = bench.Reviewer(page, 3.0, "each")
+    reviewer.decide()
+    assert told(page) == ["a", "b", "place 3", "c", "place 1"]
+    assert reviewer.decisions == 5 and set(reviewer.accepted) == {"a", "b", "c"} and not reviewer.refusals
+    assert page.now == pytest.approx(5 * 3.0, abs=0.8)
+
+
+def test_a_cut_that_changes_while_it_is_looked_at_is_accepted_as_it_is_then_and_a_moment_later():
+    page = Page([at("a", 1, 1)], changes=[(0.9, "a")])
+    bench.Reviewer(page, 1.0, "each").decide()
+    ((when, asked),) = page.asked
+    assert asked.revision == 2 and 1.6 <= when <= 1.8
+
+
+def test_a_refused_acceptance_is_asked_twice_and_told_with_its_code():
+    page = Page([at("a", 1, 1), at("b", 1, 2)], refuses=("a",))
+    reviewer = bench.Reviewer(page, 1.0, "each")
+    reviewer.decide()
+    assert told(page) == ["a", "b", "a"]
+    assert reviewer.refusals == {"a": "point_unseen"} and set(reviewer.accepted) == {"b"}
+
+
+def test_sure_cuts_take_two_presses_and_the_others_one_each():
+    page = Page([at("a", 1, 1), at("b", 1, 2), at("c", 1, 3, confidence=0.5)])
+    reviewer = bench.Reviewer(page, 3.0, "sure")
+    reviewer.decide()
+    assert told(page) == ["place ", "c"] and isinstance(page.asked[0][1], intents.AcceptAll)
+    assert reviewer.decisions == 3 and set(reviewer.accepted) == {"a", "b", "c"}
+
+
+def test_a_reviewer_who_decides_nothing_asks_for_nothing():
+    page = Page([at("a", 1, 1)], [place(2)])
+    reviewer = bench.Reviewer(page, 3.0, "nothing")
+    reviewer.decide()
+    assert not page.asked and reviewer.decisions == 0 and not reviewer.accepted
+
+
+# --- the judge --------------------------------------------------------------------------------------------------------
+
+
+def asked_for(count):
+    return [each for each in WANTED if each.cut is not None and each.kind == "spur cut"][:count]
+
+
+def bite(each, past=0.0):
+    where = each.cut.best + past * each.cut.tangent
+    kind = "spur" if each.cane == STUB else "cane"
+    piece = {"vine": each.vine, "spur": each.spur, "cane": each.cane, "kind": kind, "point": where.tolist()}
+    return {"event": "cut", "point_id": f"p{each.spur}", "code": "wood_severed", "severed": [piece]}
+
+
+def proposal(each):
+    return point(f"p{each.spur}", tuple(each.cut.best.tolist()), vine=1, spur=each.spur)
+
+
+def test_every_cut_that_the_vine_asks_for_has_one_outcome_with_its_reason():
+    right, harmed, refused, void, open_, unseen = asked_for(6)
+    points = {f"p{each.spur}": proposal(each) for each in (right, harmed, refused, void)}
+    accepted = {name: m.QueueEntry(point_id=name, state="ACCEPTED") for name in points if name != f"p{void.spur}"}
+    reviewer = SimpleNamespace(points=points, accepted=accepted, refusals={f"p{void.spur}": "point_unseen"})
+    ends = {name: m.QueueEntry(point_id=name, state="DONE") for name in accepted}
+    ends[f"p{refused.spur}"] = m.QueueEntry(
+        point_id="x", state="UNREACHABLE", reason=reasons.not_reachable(reasons.out_of_reach(0.9, 1.6))
+    )
+    stub = next(rod for _, rod in ROW.standing() if rod.kind == "spur" and rod.spur == open_.spur)
+    site = m.UndecidedSite(
+        reason=reasons.cane_end_unclear(), needs="operator", vine=1, spur=9, position=tuple(stub.end.tolist())
+    )
+    found = bench.places(ROW, WANTED, [bite(right), bite(harmed, -0.06)], reviewer, ends, [site])
+    assert len(found) == sum(each.cut is not None for each in WANTED)
+    outcome = {(each.spur, each.kind): (each.outcome, each.reason) for each in found}
+    assert outcome[right.spur, "spur cut"] == ("right", "")
+    assert outcome[harmed.spur, "spur cut"][0] == "wrong" and "cut off" in outcome[harmed.spur, "spur cut"][1]
+    assert outcome[refused.spur, "spur cut"] == ("refused", "not_reachable: out_of_reach")
+    assert outcome[void.spur, "spur cut"] == ("refused", "point_unseen")
+    assert outcome[open_.spur, "spur cut"] == ("undecided", "cane_end_unclear")
+    assert outcome[unseen.spur, "spur cut"] == ("unseen", "")
+
+
+def test_of_a_guyot_vine_both_canes_of_the_spur_are_asked_for_and_its_stub_stays():
+    row = grow(VineyardConfig(vines=1, training="guyot"), 3)
+    wanted = wanted_cuts(row, guyot=True)
+    assert [each.kind for each in wanted if each.cut is not None] == ["spur cut", "cane cut"]
+    reviewer = SimpleNamespace(points={}, accepted={}, refusals={})
+    lower, upper, stub = wanted
+    found = bench.places(row, wanted, [bite(lower), bite(upper)], reviewer, {}, [])
+    assert [each.outcome for each in found] == ["right", "right"]
+    piece = {"vine": 0, "spur": 0, "cane": STUB, "kind": "spur", "point": [0.0, 0.0, 0.0]}
+    assert "stays" in bench.true_cut([stub], [piece]).harm
+
+
+# --- the figures ------------------------------------------------------------------------------------------------------
+
+
+def run(seed=1, outcomes=("right", "refused"), blocked="", harm="", ended="", survey=20.0, decisions=4):
+    stages = dict.fromkeys(bench.VINE_STAGES, 0.0) | {"survey": survey, "decisions": 3.0 * decisions}
+    cuts = (Cut("hierarchy", seed, "p", "DONE", "", None, None, 0.0, not harm, harm, True, 2, 0.0),)
+    places = tuple(bench.Place(k, "spur cut", blocked, each, "") for k, each in enumerate(outcomes))
+    return bench.VineRun(
+        seed, "spur", "calm", "each", 3.0, stages, decisions, {}, cuts, places, 0, 0, 0, {}, ended, 100.0
+    )
+
+
+def test_without_vines_or_cuts_nothing_is_shared_in_and_nothing_divided():
+    for runs in ([], [run(outcomes=(), decisions=0)]):
+        figures = bench.summarise(runs)
+        assert all(figures[outcome].value is None and figures[outcome].n == 0 for outcome in bench.OUTCOMES)
+    assert bench.summarise([])["harmed"].value is None
+    assert bench.summarise([run(ended="PAUSED: x")])["machine_s_median"].value is None
+
+
+def test_shares_are_of_the_cuts_with_room_and_seconds_of_the_vines_that_were_left():
+    runs = [
+        run(1, ("right", "right", "undecided")),
+        run(2, ("wrong", "unseen"), harm="a node", survey=80.0, decisions=2),
+        run(3, ("refused",), blocked="wire"),
+        run(4, ("right",), ended="PAUSED: x", survey=500.0),
+    ]
+    figures = bench.summarise(runs)
+    assert (figures["right"].value, figures["right"].n) == (pytest.approx(3 / 6), 6)
+    assert figures["blocked"].value == pytest.approx(1 / 7)
+    assert figures["harmed"].value == figures["machine_60_s"].value - 2 / 3 + 0.25 == 0.25
+    assert figures["machine_s_most"].value == 80.0 and figures["left_the_vine"].value == 0.75
+    assert figures["person_10_s"].value == pytest.approx(1 / 3), "three decisions of three seconds are more than 10 s"
+
+
+def test_a_run_goes_on_where_the_last_one_stopped_and_its_file_is_drawn(tmp_path: Path, monkeypatch, capsys):
+    made = []
+
+    def pruned(seed, *rest):
+        made.append((seed, *rest))
+        return run(seed)
+
+    monkeypatch.setattr(bench, "prune_vine", pruned)
+    path = tmp_path / "vine.json"
+    assert bench.main(["--seed", "7", "--count", "1", "--json", str(path)]) == 0
+    assert bench.main(["--seed", "7", "--count", "2", "--json", str(path)]) == 0
+    assert made == [(seed, "spur", "calm", "each", 3.0, 2.0, "") for seed in (7, 8)]
+    document = json.loads(path.read_text())
+    assert document["summary"]["spur, calm, each 3 s"]["right"] == pytest.approx(
+        {"value": 0.5, "low": 0.15, "high": 0.85, "n": 4}, abs=0.01
+    )
+    assert bench.read(path) == [run(7), run(8)]
+    assert "seed 8" in capsys.readouterr().out
+    figure = Figure()
+    draw_vine(tmp_path, figure)
+    (panel,) = figure.axes
+    assert "2 vines" in panel.get_title(loc="left")
+    widths = [bar.get_width() for bar in panel.patches if bar.get_width() > 0.0]
+    assert sorted(widths) == [12.0, 12.0, 20.0, 20.0]
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"results": [{"seed": 1}]}'])
+def test_a_file_of_something_else_is_refused_and_stays(tmp_path: Path, text):
+    path = tmp_path / "vine.json"
+    path.write_text(text)
+    with pytest.raises(InputError, match="bench vine"):
+        bench.main(["--count", "1", "--json", str(path)])
+    assert path.read_text() == text
+    with pytest.raises((InputError, ValueError)):
+        draw_vine(tmp_path, Figure())
+
+
+@pytest.mark.parametrize(
+    "words",
+    [["--preset", "hail"], ["--training-system", "bush"], ["--count", "0"], ["--decision", "-1"], ["--decision", "x"]],
+)
+def test_what_it_does_not_know_is_refused_before_anything_runs(words, capsys):
+    with pytest.raises(SystemExit):
+        bench.main(words)
+    assert words[0] in capsys.readouterr().err
+
+
+def test_an_unknown_world_is_refused_with_those_that_there_are():
+    with pytest.raises(InputError, match="calm, field, storm"):
+        bench.prune_vine(1, preset="hail")
+
+
+# --- whole vines ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.long
+def test_a_vine_that_nobody_decides_about_is_surveyed_left_and_told():
+    found = bench.prune_vine(3, review="nothing", segmenter="labels", pictures=0.7)
+    assert found.ended == "" and found.decisions == 0 and not found.cuts
+    assert {each.outcome for each in found.places} <= {"undecided", "unseen"}
+    assert found.stages["survey"] > 12.0 and found.stages["blades"] == 0.0 and found.contacts == 0
+
+
+@pytest.mark.long
+def test_a_vine_without_canes_asks_for_no_cut_and_gets_none(monkeypatch):
+    def bare(config: VineyardConfig, seed: int) -> Row:
+        row = grow(config, seed)
+        return Row(tuple(None if rod is not None and rod.cane >= 0 else rod for rod in row.rods), 0, row.backdrop)
+
+    monkeypatch.setattr(build, "grow", bare)
+    found = bench.prune_vine(3, segmenter="labels", pictures=0.7, decision_s=1.0)
+    assert found.ended == "" and not found.places and not found.cuts and found.stages["blades"] == 0.0
+    assert np.isfinite(found.machine_s) and bench.summarise([found])["right"].value is None
