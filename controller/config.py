@@ -219,8 +219,9 @@ class SupervisionConfig(Struct, frozen=True, forbid_unknown_fields=True):
         hold_link_max_age_s: Age limit of server heartbeats in teleoperation (s).
         perception_max_age_s: Age limit of perception heartbeats in automatic work (s).
         ledger_max_age_s: Work whose record is not durable after this long is a fault (s).
-        obstacles_max_age_s: Age limit of the camera frame behind the obstacles in automatic work (s). While nothing
-            moves, the camera sends a frame every 2 s.
+        obstacles_max_age_s: Age limit of the camera frame behind the obstacles in automatic work (s); beyond it the
+            robot stands. While nothing moves, the camera sends a frame every 2 s.
+        picture_wait_s: So long the robot stands for a newer frame before the work pauses (s).
     """
 
     joints_max_age_s: Annotated[float, at_most(0.25)] = 0.2
@@ -232,6 +233,7 @@ class SupervisionConfig(Struct, frozen=True, forbid_unknown_fields=True):
     perception_max_age_s: Annotated[float, at_most(2.0)] = 1.0
     ledger_max_age_s: Annotated[float, at_most(0.8)] = 0.6
     obstacles_max_age_s: Annotated[float, at_most(10.0)] = 6.0
+    picture_wait_s: Annotated[float, at_most(30.0)] = 15.0
 
 
 class ContactConfig(Struct, frozen=True, forbid_unknown_fields=True):

@@ -290,7 +290,7 @@ class Controller:
         """The motion of this period, and its effect on the mode."""
         supervisor = self._supervisor
         try:
-            moved = self._movement.step(self.mode, supervisor.authority.held, now)
+            moved = self._movement.step(self.mode, supervisor.authority.held, now, supervisor.waits is not None)
         except ControlError as error:
             supervisor.event(Event.FAULT, now, reasons.motion_failed(str(error)))
             return self._movement.ramp()
@@ -426,6 +426,7 @@ class Controller:
             config=self._config,
             robot=movement.body.robot,
             state=self._supervisor.state,
+            waits=self._supervisor.waits,
             phase=movement.sequence.phase,
             active=movement.sequence.active,
             measured=movement.body.measured,

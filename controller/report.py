@@ -19,6 +19,7 @@ def controller_state(
     config: ControllerConfig,
     robot: RobotModel,
     state: State,
+    waits: m.Reason | None,
     phase: m.Phase,
     active: str,
     measured: Measured | None,
@@ -40,6 +41,7 @@ def controller_state(
         config: Section `[controller]`.
         robot: Robot model.
         state: State of the supervision state machine.
+        waits: Why the robot stands in the midst of its work; None where it does not.
         phase: Phase of the cut sequence.
         active: Current point of the work.
         measured: Measured state of the robot; None before the first joint state.
@@ -67,7 +69,7 @@ def controller_state(
         header=m.Header(now, "odom"),
         mode=state.mode,
         phase=phase if state.mode == "AUTO" else "",
-        reason=reasons.held_back(held) if held else state.reason,
+        reason=reasons.held_back(held) if held else waits or state.reason,
         allowed=allowed,
         of_holder=of_holder(state.mode),
         active_point_id=active if state.mode == "AUTO" else "",

@@ -1,5 +1,6 @@
 """Perception as a process: newest frame in, points out, one heartbeat a step. A worker thread processes the frames."""
 
+import math
 import threading
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -179,6 +180,8 @@ class PerceptionProcess:
     def _accept(self, output: _Output, now: float) -> None:
         self._newest, self._last_error, self._camera = output, "", output.camera
         self._out.append(output.points)
+        # The controller counts the age of what it has: a repetition a second later is too late on a busy machine.
+        self._obstacles_sent = -math.inf
         if output.reply is not None:
             self._out.append(output.reply)
         self._add_new_pictures(output.pictures)

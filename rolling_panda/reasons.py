@@ -276,6 +276,11 @@ def obstacles_stale(age_s: float, limit_s: float) -> None:
     """The newest camera frame with the obstacles is {age_s:.2f} s old; the limit is {limit_s:g} s."""
 
 
+@_reason("info", "")
+def waits_for_picture(limit_s: float) -> None:
+    """The robot stands until a newer camera frame comes: the newest one is more than {limit_s:g} s old."""
+
+
 @_reason("warning", "start it again")
 def process_gone(process: str) -> None:
     """The {process} process is gone."""

@@ -110,6 +110,7 @@ _ALL: Final = (
     Limit("controller.supervision.perception_max_age_s", 1.0),
     Limit("controller.supervision.ledger_max_age_s", 0.6),
     Limit("controller.supervision.obstacles_max_age_s", 6.0),
+    Limit("controller.supervision.picture_wait_s", 15.0),
     Limit("controller.teleoperation.hold_max_age_s", 0.15),
     # What the arm feels, and what stops it in its control box.
     Limit("controller.contact.light_force", 8.0, unit="N"),

@@ -111,9 +111,9 @@ def _picture_age(obstacles: Received[Obstacles] | None, joints: Received[JointSt
 
 @dataclass(frozen=True)
 class Verdict:
-    """Reaction to the health, with its reason."""
+    """Reaction to the health, with its reason. `wait`: the robot stands, and goes on by itself."""
 
-    action: Literal["pause", "protect", "fault"]
+    action: Literal["wait", "pause", "protect", "fault"]
     reason: Reason
 
 
@@ -142,8 +142,12 @@ def check(mode: Mode, moving: bool, health: Health, config: SupervisionConfig) -
         return Verdict("protect", why)
     why = supervision(health, config, teleoperated=mode == "TELEOP")
     if why is None and mode == "AUTO":
-        why = perception(health, config)
-    return None if why is None else Verdict("pause", why)
+        why = perception(health, config, config.picture_wait_s)
+    if why is not None:
+        return Verdict("pause", why)
+    if mode == "AUTO" and health.obstacles > config.obstacles_max_age_s:
+        return Verdict("wait", reasons.waits_for_picture(config.obstacles_max_age_s))
+    return None
 
 
 def cause(health: Health, config: SupervisionConfig) -> Reason | None:
@@ -182,9 +186,15 @@ def supervision(health: Health, config: SupervisionConfig, teleoperated: bool) -
     return _process("server", health.server, allowed, health.present)
 
 
-def perception(health: Health, config: SupervisionConfig) -> Reason | None:
-    """Reason why perception's state forbids automatic work; None if it allows it."""
-    if health.obstacles > config.obstacles_max_age_s:
+def perception(health: Health, config: SupervisionConfig, waited_s: float = 0.0) -> Reason | None:
+    """Reason why perception's state forbids automatic work; None if it allows it.
+
+    Args:
+        health: Of the inputs.
+        config: Age limits.
+        waited_s: What a robot that stands waits for a frame beyond the limit of its age (s).
+    """
+    if health.obstacles > config.obstacles_max_age_s + waited_s:
         return _stale(reasons.obstacles_stale, health.obstacles, config.obstacles_max_age_s, topics.OBSTACLES.name)
     return _process("perception", health.perception, config.perception_max_age_s, health.present)
 

@@ -62,6 +62,8 @@ class Supervisor:
         self.state = modes.boot()
         #: Activity that a pause or a protective stop interrupted, until the next start.
         self.interrupted: m.Interrupted = ""
+        #: Why the robot stands in the midst of its work, to go on by itself; None where it does not.
+        self.waits: m.Reason | None = None
         self._inbox = Inbox()
         #: Time of the last followed command, and the number of refused commands by then.
         self._obeyed, self._refused = 0.0, 0
@@ -119,6 +121,7 @@ class Supervisor:
             self._pause(lost, now)
         moving = self._movement.homing or self._movement.backing_off
         verdict = safety.check(self.mode, moving, self.health, self._config)
+        waited, self.waits = self.waits, None
         match verdict:
             case safety.Verdict("fault", reason):
                 self.event(Event.FAULT, now, reason)
@@ -130,6 +133,10 @@ class Supervisor:
                     self._movement.back_off()
             case safety.Verdict("pause", reason):
                 self._pause(reason, now)
+            case safety.Verdict("wait", reason):
+                self.waits = reason
+                if waited is None:
+                    self._event_log.log(reason)
         self._movement.sequence.finish_cut_and_pause(self.authority.unwatched(now))
         self.state = modes.observe(self.state, safety.cause(self.health, self._config), now)
         self._review_hold(now)

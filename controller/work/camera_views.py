@@ -159,6 +159,10 @@ class CameraViews:
         self._asked = ""
         self._skipped: Reason | None = None
 
+    def hold(self) -> None:
+        """The robot stands for one period."""
+        self._timeout.again()
+
     def step(self, robot: Measured, now: float) -> StepResult:
         """One period.
 

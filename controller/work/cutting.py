@@ -255,6 +255,10 @@ class FollowedMotion:
         self.timeout.note(tracking)
         return tracking
 
+    def hold(self) -> None:
+        """The robot stands for one period, which is no delay of this motion."""
+        self.timeout.again()
+
 
 @dataclass(frozen=True, eq=False)
 class CutTask:
@@ -294,6 +298,9 @@ class Stage(ABC):
     def plans(self) -> tuple[CutPlan, ...]:
         """Plans of the cuts that the motion begins or ends at."""
         return ()
+
+    def hold(self) -> None:  # noqa: B027
+        """The robot stands in this period, in place of `step`. No timeout counts it."""
 
     @abstractmethod
     def step(self, robot: Measured, now: float) -> "Step":
@@ -374,6 +381,10 @@ class Escaping(Stage):
         super().__init__(parts)
         self._way = way
 
+    def hold(self) -> None:
+        """Stand for one period."""
+        self._way.hold()
+
     def step(self, robot: Measured, now: float) -> Step:
         """One period."""
         tracking = self._way.track(robot)
@@ -439,6 +450,10 @@ class MovingStage(TaskStage):
         """For one cut, along `way`."""
         super().__init__(parts, task)
         self._way = way
+
+    def hold(self) -> None:
+        """Stand for one period."""
+        self._way.hold()
 
     def _retreat(self, robot: Measured) -> "Retreat":
         """Straight out of the canes, and on to the next cut where one is found."""
@@ -607,6 +622,10 @@ class Retreat(LeavingStage):
         super().__init__(parts, task)
         self._way = way
 
+    def hold(self) -> None:
+        """Stand for one period."""
+        self._way.hold()
+
     def step(self, robot: Measured, now: float) -> Step:
         """One period."""
         parts, following, timeout = self._parts, self._parts.next_cut, self._way.timeout
@@ -634,6 +653,10 @@ class Withdraw(LeavingStage):
         super().__init__(parts, task)
         self._withdrawal = withdrawal
 
+    def hold(self) -> None:
+        """Stand for one period."""
+        self._withdrawal.hold()
+
     def step(self, robot: Measured, now: float) -> Step:
         """One period."""
         self._parts.look_back(robot, now)
@@ -655,6 +678,10 @@ class Surveying(Stage):
         super().__init__(parts)
         self._survey = survey
 
+    def hold(self) -> None:
+        """Stand for one period."""
+        self._survey.hold()
+
     def step(self, robot: Measured, now: float) -> Step:
         """One period."""
         if self._parts.ending:
@@ -671,6 +698,10 @@ class Calibrating(Stage):
         """With one round of pictures."""
         super().__init__(parts)
         self._views = views
+
+    def hold(self) -> None:
+        """Stand for one period."""
+        self._views.hold()
 
     def step(self, robot: Measured, now: float) -> Step:
         """One period."""
@@ -803,6 +834,10 @@ class CutSequence:
     def picture(self, now: float) -> tuple[int, str] | None:
         """Number and point of the picture to ask for in this period; None when none is due."""
         return self._parts.close_ups.due(now)
+
+    def hold(self) -> None:
+        """Stand for one period in place of `step`. A close-up or a cut that was asked for goes on."""
+        self._stage.hold()
 
     def step(self, robot: Measured, now: float) -> StepResult:
         """One period of work.

@@ -80,6 +80,10 @@ class Withdrawal:
         #: Whether the arm has arrived, and whether the motion has failed.
         self.done = self.late = False
 
+    def hold(self) -> None:
+        """The robot stands for one period."""
+        self._timeout.again()
+
     def step(self, robot: Measured, now: float) -> Tracking:
         """One period."""
         tracking = self._motion.step(robot, self._follower, self._dt)

@@ -169,13 +169,14 @@ class Movement:
         """Come to rest, or stay there."""
         return MotionResult(self._saturation.ramp(self._setpoints.sent))
 
-    def step(self, mode: m.Mode, held: bool, now: float) -> MotionResult:
+    def step(self, mode: m.Mode, held: bool, now: float, waits: bool = False) -> MotionResult:
         """One period.
 
         Args:
             mode: Mode of the supervision state machine.
             held: Whether a person has control.
             now: Monotonic time (s).
+            waits: Whether the work stands for a while, to go on by itself.
 
         Raises:
             ControlError: The motion cannot be computed.
@@ -193,7 +194,12 @@ class Movement:
                 return MotionResult(self._saturation.ramp(self._setpoints.sent), event=(Event.RELEASE, refused))
             self.tracking = self.teleoperation.step(robot)
             return MotionResult(self.tracking.xi)
-        return self._bring_home(robot) if mode == "READY" else self._work(robot, now)
+        if mode == "READY":
+            return self._bring_home(robot)
+        if waits:
+            self.sequence.hold()
+            return self.ramp()
+        return self._work(robot, now)
 
     def send(
         self, xi: Array, token: Token | None, joints: Received[m.JointState] | None, latched: bool

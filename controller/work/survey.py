@@ -64,6 +64,10 @@ class Survey:
         self._there_at: float | None = None
         self._moved: tuple[float, float] | None = None
 
+    def hold(self) -> None:
+        """The robot stands for one period; that is no obstacle."""
+        self._moved = None
+
     def step(self, robot: Measured, now: float) -> StepResult:
         """One period.
 

@@ -1,13 +1,17 @@
 """Operators who change their minds at the worst moment: nothing is cut or moved that was not asked for last."""
 
+import msgspec
 import numpy as np
+import pytest
 
 from rolling_panda import commands as intents
+from rolling_panda import messages as m
 from rolling_panda import reasons
+from rolling_panda.messages.perception import Obstacles
 from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
 from rolling_panda.model.robot import ARM_Q
 from rolling_panda.reasons import text_of
-from tests.support.controller_at_work import entry, finish, robot, run_until, working
+from tests.support.controller_at_work import CONFIG, entry, finish, robot, run_until, working
 from tests.support.points import point
 
 
@@ -104,3 +108,59 @@ def test_a_hold_pressed_on_the_way_home_moves_nothing_when_the_arm_is_there():
     r.run(6.0)
     assert r.state.mode == "READY" and r.state.reason == reasons.arm_home()
     assert abs(r.q[0]) < 1e-3
+
+
+WAITS = reasons.waits_for_picture(CONFIG.supervision.obstacles_max_age_s)
+
+
+def without_pictures(r, seconds):
+    """The newest picture is too old from now on; returns the velocities commanded, without the braking."""
+    stamp = r.now - CONFIG.supervision.obstacles_max_age_s - 0.1
+    r.hear(Obstacles(header=m.Header(stamp, "odom"), capsules=r.obstacles))
+    r.deaf.add(Obstacles)
+    r.run(0.5)
+    before = len(r.record)
+    r.run(seconds - 0.5)
+    return np.array(r.record[before:])
+
+
+@pytest.mark.parametrize(("phase", "after_s"), [("APPROACH", 0.5), ("ADVANCE", 1.0), ("CUT", 0.1), ("RETREAT", 0.1)])
+def test_without_a_new_picture_the_robot_stands_and_goes_on_by_itself(phase, after_s):
+    shown = point("p0", (0.2, 0.75, 1.05)), point("p1", (0.9, 0.75, 1.05))
+    slow = msgspec.structs.replace(CONFIG, work=msgspec.structs.replace(CONFIG.work, reach_timeout_s=1.0))
+    r = working(shown, config=slow)
+    run_until(r, lambda s: s is not None and s.phase == phase, 20.0)
+    r.run(after_s)
+    assert r.state.phase == phase
+    resting = without_pictures(r, 12.0)
+    assert r.state.mode == "AUTO" and r.state.reason == WAITS
+    assert np.abs(resting).max() < 1e-3
+    r.deaf.clear()
+    finish(r, 60.0)
+    assert [each.state for each in r.state.queue] == ["DONE", "DONE"]
+    for each in shown:
+        assert np.linalg.norm(cut_at(r, each.point_id) - each.position) < 0.0015
+    assert sum("until a newer camera frame" in line for line in r.events) == 1
+
+
+def test_a_survey_stands_without_a_new_picture_and_takes_that_for_no_obstacle():
+    r = robot()
+    r.run(0.05)
+    assert r.ask(intents.Arm(user="ada")).ok
+    assert r.ask(intents.Survey(user="ada", distance=1.0)).ok
+    run_until(r, lambda _: np.abs(r.xi[:2]).max() > 0.1, 5.0)
+    resting = without_pictures(r, 12.0)
+    assert r.state.reason == WAITS and np.abs(resting).max() < 1e-3
+    r.deaf.clear()
+    finish(r, 60.0)
+    assert r.q[0] > 0.95 and r.state.reason.code == "survey_blind"
+
+
+def test_a_picture_that_does_not_come_pauses_the_work():
+    r = working((point("p0", (0.2, 0.75, 1.05)),))
+    run_until(r, lambda s: s is not None and s.phase == "APPROACH", 5.0)
+    without_pictures(r, CONFIG.supervision.picture_wait_s + 0.2)
+    assert r.state.mode == "PAUSED" and r.state.reason.code == "obstacles_stale"
+    r.deaf.clear()
+    r.run(3.0)
+    assert r.state.mode == "PAUSED", "from here only an operator goes on"

@@ -126,9 +126,18 @@ def test_a_contact_stops_every_motion_and_while_the_robot_goes_back_only_another
     assert check("PROTECTIVE_STOP", True, astray, CONFIG) == Verdict("protect", ASTRAY)
 
 
-def test_old_pictures_of_what_stands_around_stop_automatic_work_alone():
-    old = verdict("AUTO", obstacles=6.5)
-    assert old == Verdict("pause", reasons.obstacles_stale(6.5, CONFIG.obstacles_max_age_s))
+def test_with_an_old_picture_of_what_stands_around_automatic_work_alone_stands_and_pauses_at_last():
+    waits = Verdict("wait", reasons.waits_for_picture(CONFIG.obstacles_max_age_s))
+    assert verdict("AUTO", obstacles=CONFIG.obstacles_max_age_s - 0.01) is None
+    assert verdict("AUTO", obstacles=CONFIG.obstacles_max_age_s + 0.01) == waits
+    last = CONFIG.obstacles_max_age_s + CONFIG.picture_wait_s
+    assert verdict("AUTO", obstacles=last - 0.01) == waits
+    old = verdict("AUTO", obstacles=last + 0.01)
+    assert old == Verdict("pause", reasons.obstacles_stale(last + 0.01, CONFIG.obstacles_max_age_s))
+    gone = verdict("AUTO", obstacles=6.5, present=ALL - {"perception"})
+    assert gone == Verdict("pause", reasons.process_gone("perception")), "nothing to wait for"
+    server = verdict("AUTO", obstacles=6.5, server=9.0)
+    assert server.action == "pause"
     never = verdict("AUTO", obstacles=math.inf)
     assert never == Verdict("pause", reasons.nothing_received(topics.OBSTACLES.name))
     assert verdict("TELEOP", obstacles=6.5) is None

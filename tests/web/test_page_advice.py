@@ -113,6 +113,17 @@ def test_once_resume_is_pressed_nothing_advises_to_press_it(page: Page, server: 
     expect(page.locator("#alarms li")).to_have_count(0)
 
 
+def test_a_robot_that_stands_for_a_picture_tells_so_and_asks_for_nothing(page: Page, server: PlayedServer) -> None:
+    server.controller = mode("AUTO", phase="APPROACH", reason=reasons.waits_for_picture(6.0))
+    show(server, TAKEN)
+    expect(page.locator("#alarms li:not(.gone)")).to_contain_text("until a newer camera frame comes")
+    expect(page.locator("#alarms .act:visible")).to_have_count(0)
+    expect(page.locator("#pause")).to_have_attribute("aria-disabled", "false")
+    server.controller = mode("AUTO", phase="APPROACH")
+    show(server, TAKEN)
+    expect(page.locator("#alarms")).to_be_hidden()
+
+
 def asked(server: PlayedServer) -> list[str]:
     return [path for path, _ in server.posted if path in ("/api/resume", "/api/start")]
 

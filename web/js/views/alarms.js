@@ -93,6 +93,8 @@ function ofMode({ controller }) {
       const waits = controller.interrupted === "work" && countOf("ACCEPTED") > 0;
       return waits ? [alarm(reason("work_waits"), byOperator(next(controller)))] : [];
     }
+    case "AUTO":
+      return cause?.code === "waits_for_picture" ? [alarm(cause)] : [];
     default:
       return [];
   }
