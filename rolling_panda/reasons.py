@@ -653,6 +653,11 @@ def no_link() -> None:
     """This page has no link to the server."""
 
 
+@_reason("warning", "wait")
+def stop_asked() -> None:
+    """The stop was pressed on this page, and the robot has not confirmed it yet."""
+
+
 @_reason("info", "wait")
 def no_state_yet() -> None:
     """No state has arrived yet."""

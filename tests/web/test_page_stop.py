@@ -8,7 +8,7 @@ from rolling_panda import reasons
 from rolling_panda.messages import page as p
 from rolling_panda.messages.supervision import StopRecord, StopState
 from rolling_panda.reasons import said, text_of
-from tests.support.page_parts import open_screen
+from tests.support.page_parts import open_screen, ready, show_mode, working
 from tests.support.played_page import box_of, until
 from tests.support.played_server import PlayedServer, bridge, controller
 
@@ -73,3 +73,18 @@ def test_no_notice_lies_over_the_field_for_the_reason(page: Page, server: Played
     field = box_of(page.locator("rp-stop-banner input"))
     notice = box_of(page.locator(".toast").first)
     assert notice["y"] + notice["height"] <= field["y"]
+
+
+def test_nothing_starts_between_the_press_and_its_confirmation(page: Page, server: PlayedServer) -> None:
+    working(page, server)
+    start = page.locator("#start")
+    expect(start).to_be_enabled()
+    page.locator("#stop").click()
+    expect(start).to_be_disabled()
+    expect(start).to_have_attribute("title", text_of(reasons.stop_asked()))
+    server.bridge = bridge(stop_id="s1", stopped_by=reasons.software_stop("Ada", said("stop button")))
+    server.controller = controller("ESTOP_LATCHED", reason="stopped by Ada")
+    expect(page.locator("#to-reset")).to_be_visible()
+    server.bridge = bridge()
+    show_mode(page, server, ready())
+    expect(start).to_be_enabled()

@@ -5,6 +5,7 @@ import { COMMANDS, isCommand, surveyDistance, take, whyNotStep } from "../js/con
 import { nextStep, waitingForPerson } from "../js/control/next-step.js";
 import { closePreview, hasPreview, openPreview, previewOpen, whyNoPreview } from "../js/control/preview.js";
 import { timeLeft } from "../js/control/progress.js";
+import { stopProgress } from "../js/control/stop.js";
 import { durationWords } from "../js/state/format.js";
 import { link, now, pageState, points, preview, say } from "../js/state/page-state.js";
 import { reasonText } from "../js/state/reasons.js";
@@ -55,7 +56,7 @@ class RpBar extends HTMLElement {
       if (isOpen) void fetchPreview();
     });
 
-    drawOn([pageState, points, preview, previewOpen, screen, link, now], () => {
+    drawOn([pageState, points, preview, previewOpen, screen, link, now, stopProgress], () => {
       this.draw();
       const step = nextStep();
       const refused = step && whyNotStep(step);

@@ -5,6 +5,7 @@ import { POINT_STATES } from "../link/messages.js";
 import { STALE_AFTER_S, isLive, link, pageState, points, processAge } from "../state/page-state.js";
 import { reason } from "../state/reasons.js";
 import { holder } from "./lease.js";
+import { stopProgress } from "./stop.js";
 
 /** @typedef {import("../link/messages.js").Process} Process */
 /** @typedef {import("../state/reasons.js").Reason} Reason */
@@ -58,6 +59,9 @@ export function whyNot(command) {
   if (!controller || refusal === undefined) return reason("command_unknown", { command });
   const { held, mine, user } = holder();
   const theirs = held && !mine && controller.of_holder.includes(command);
+  // Until the robot tells of a stop that was pressed here, its state still allows what the stop will refuse.
+  const stopping = stopProgress.get() === "sending" || stopProgress.get() === "sent";
+  if (stopping && controller.of_holder.includes(command)) return refusal ?? reason("stop_asked");
   return refusal ?? (theirs ? reason("control_held", { user }) : null);
 }
 
