@@ -91,6 +91,7 @@ def controller_state(
         relaxed_limits=relaxed_limits,
         postures=postures,
         tool_force=tool_force,
+        kept_margin=config.whole_body.joint_margin,
     )
 
 

@@ -145,6 +145,7 @@ class ControllerState(Message, frozen=True, kw_only=True):
         rotation_error: Tool rotation error (rad).
         manipulability: ω of the arm.
         joint_margin: Smallest distance of an arm joint to its limit (rad).
+        kept_margin: Distance from the limit of every arm joint that no motion enters (rad).
         tick_s: Median duration of one control step over the last second (s).
         ticks: Control periods since the start.
         late_ticks: Control periods that lasted more than 1.5 times their nominal length.
@@ -184,6 +185,7 @@ class ControllerState(Message, frozen=True, kw_only=True):
     relaxed_limits: tuple[Reason, ...] = ()
     postures: tuple[SavedPosture, ...] = ()
     tool_force: NonNegative | None = None
+    kept_margin: NonNegative = 0.0
 
 
 #: Public key of a client: a digest of its session, never the session itself. Empty = nobody.

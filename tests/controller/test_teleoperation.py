@@ -384,6 +384,9 @@ def test_a_posture_that_the_arm_cannot_take_moves_nothing_and_says_why(joint, an
     before = r.q.copy()
     answer = r.ask(intents.CheckPosture(user="ada", angles=tuple(goal)))
     assert not answer.ok and answer.reason.code == code
+    if code == "posture_out_of_range":
+        upper = r.model.limits.upper[4 + joint]
+        assert dict(answer.reason.values)["high_deg"] == pytest.approx(np.degrees(upper - r.state.kept_margin))
     lead(r, posture=tuple(goal))
     r.run(0.5)
     assert r.q == pytest.approx(before, abs=1e-6) and r.state.mode == "READY"

@@ -327,6 +327,17 @@ def test_what_is_no_angle_of_the_joint_is_refused_with_the_reason(
     assert holds(server) == [] and not any(path == "/api/postures/check" for path, _ in server.posted)
 
 
+def test_bar_and_refusal_name_the_range_that_the_controller_leaves(page: Page, server: PlayedServer) -> None:
+    server.controller = controller(kept_margin=0.03)
+    begin(page, "Joints")
+    # 2.9 rad are 166.2°, and 1.7° of them are never entered.
+    page.locator(".joint .target").nth(1).fill("165")
+    expect(page.locator(".drive-foot .hint")).to_contain_text("only from -164.4° to 164.4°")
+    expect(page.locator(".joint .scale").nth(1)).to_have_attribute("title", "-164° to 164°")
+    page.locator(".joint .target").nth(1).fill("164")
+    expect(page.locator("#go")).to_be_enabled()
+
+
 def test_a_posture_that_the_controller_refuses_is_not_gone_to(page: Page, server: PlayedServer) -> None:
     why = reasons.posture_touches(3.0, "link6", "post 2", 15.0)
     server.answers["/api/postures/check"] = 409, {"ok": False, "reason": text_of(why), **said_as(why)}

@@ -23,7 +23,12 @@ class RpJoints extends HTMLElement {
   connectedCallback() {
     /** @type {[number, number][]} */
     let limits = [];
-    const rows = Array.from({ length: JOINTS }, (_, joint) => jointRow(joint, () => limits[joint] ?? null));
+    const range = (/** @type {number} */ joint) => {
+      const kept = pageState.get()?.controller?.kept_margin ?? 0;
+      const [low, high] = limits[joint] ?? [NaN, NaN];
+      return limits[joint] ? /** @type {[number, number]} */ ([low + kept, high - kept]) : null;
+    };
+    const rows = Array.from({ length: JOINTS }, (_, joint) => jointRow(joint, () => range(joint)));
     this.append(...rows.map((row) => row.node));
     const draw = () => {
       if (!this.hidden) for (const row of rows) row.show();
@@ -44,7 +49,7 @@ customElements.define("rp-joints", RpJoints);
 
 /**
  * @param {number} joint From 0.
- * @param {() => [number, number]|null} range Its limits (rad); null before they are known.
+ * @param {() => [number, number]|null} range Where the controller lets it turn (rad); null before that is known.
  */
 function jointRow(joint, range) {
   const number = joint + 1;

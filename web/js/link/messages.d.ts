@@ -254,6 +254,8 @@ export interface ControllerState {
   postures: SavedPosture[];
   /** Force at the tool that explains the arm's external torques (N); None without them. */
   tool_force: number|null;
+  /** Distance from the limit of every arm joint that no motion enters (rad). */
+  kept_margin: number;
 }
 
 /** Messages of a topic that were refused for one reason. */
