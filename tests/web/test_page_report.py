@@ -2,6 +2,7 @@
 
 import re
 import time
+from itertools import pairwise
 
 import msgspec
 import pytest
@@ -12,7 +13,7 @@ from rolling_panda import reasons
 from rolling_panda.messages.supervision import CutReport, RefusalReport, SessionReport, VineReport
 from tests.support.page_parts import open_screen
 from tests.support.page_states import a_timeline
-from tests.support.played_page import until
+from tests.support.played_page import box_of, until
 from tests.support.played_server import PlayedServer, cut_picture, point
 
 pytestmark = pytest.mark.browser
@@ -240,6 +241,36 @@ def test_it_prints_on_a4_with_the_pictures_and_nothing_else_of_the_page(page: Pa
     assert {(round(float(w)), round(float(h))) for w, h in boxes} <= {(595, 842), (594, 841), (596, 842)}
     # Everything of the report is on paper: its end as well as its beginning.
     assert page.locator("rp-report").evaluate("each => getComputedStyle(each).display") == "grid"
+
+
+def test_on_paper_the_times_of_the_timeline_stand_apart(page: Page, server: PlayedServer) -> None:
+    page.set_viewport_size({"width": 1440, "height": 900})
+    server.timeline = a_timeline(time.time() - 600.0)
+    open_screen(page, "report")
+    ticks = page.locator("rp-report .time-axis span")
+    expect(ticks.nth(8)).to_be_visible()
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    page.emulate_media(media="print")
+    try:
+        page.set_viewport_size({"width": 680, "height": 960})
+        boxes = [box_of(each) for each in ticks.all()]
+        assert len(boxes) >= 2
+        assert all(left["x"] + left["width"] < right["x"] for left, right in pairwise(boxes))
+    finally:
+        page.emulate_media(media="null")
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    page.set_viewport_size({"width": 1440, "height": 900})
+    expect(ticks.nth(8)).to_be_visible()
+
+
+def test_what_is_unclear_of_the_whole_picture_is_told_without_a_vine(page: Page, server: PlayedServer) -> None:
+    why = reasons.picture_unfamiliar(1.4, 1.2)
+    usual = server.undecided_sites[0]
+    server.undecided_sites = (msgspec.structs.replace(usual, needs="operator", vine=0, spur=0, reason=why),)
+    server.points = ()
+    server.tell(server.page_points())
+    open_screen(page, "report")
+    expect(page.locator(".left-over li")).to_have_text([reasons.text_of(why)])
 
 
 def test_no_cut_is_divided_between_two_sheets(page: Page, server: PlayedServer) -> None:

@@ -240,7 +240,8 @@ class RpReport extends HTMLElement {
       .map(({ point, entry }) => line(entry.state, point.vine, point.spur, entry.state === "PROPOSED" ? null : entry.reason));
     const sites = (page?.undecided_sites ?? [])
       .filter((site) => site.needs === "operator")
-      .map((site) => line("undecided", site.vine, site.spur, site.reason));
+      // What has no vine is of the whole picture.
+      .map((site) => (site.vine === 0 ? reasonText(site.reason) : line("undecided", site.vine, site.spur, site.reason)));
     const lines = [...rows, ...sites];
     const words = lines.length > 0 ? lines : [text("report.none.left")];
     if (words.map(joined).join("\n") === [...this.left.children].map((item) => item.textContent).join("\n")) return;

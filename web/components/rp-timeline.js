@@ -18,6 +18,8 @@ const AGAIN_MS = 5000;
 /** Width of a mark, and of a tick's time (px). */
 const MARK_PX = 30;
 const TICK_PX = 90;
+/** Width of the timeline on a sheet of A4, at the size of the screen's letters (px). */
+const PAPER_PX = 640;
 /** Width of a letter of a mode's name (px). */
 const LETTER_PX = 9.5;
 /** Events of a mark whose words are shown. */
@@ -37,6 +39,7 @@ export class RpTimeline extends HTMLElement {
   words = element("p", { class: "time-words", attributes: { role: "status" } });
   /** What the marks were drawn of. */
   drawn = "";
+  onPaper = false;
 
   connectedCallback() {
     this.setAttribute("role", "group");
@@ -44,6 +47,11 @@ export class RpTimeline extends HTMLElement {
     this.append(this.track, this.words);
     this.marks.addEventListener("keydown", (event) => this.move(event));
     new ResizeObserver(() => this.draw()).observe(this.track);
+    for (const each of ["beforeprint", "afterprint"])
+      window.addEventListener(each, () => {
+        this.onPaper = each === "beforeprint";
+        this.draw();
+      });
     drawOn([timeline], () => this.draw());
     drawOn([pageState, timeline], () => this.drawHere());
   }
@@ -58,7 +66,7 @@ export class RpTimeline extends HTMLElement {
 
   draw() {
     const told = timeline.get();
-    const width = this.track.clientWidth;
+    const width = this.onPaper ? PAPER_PX : this.track.clientWidth;
     const span = told ? told.ended_at - told.began_at : 0;
     this.classList.toggle("nothing", span <= 0);
     if (!told || span <= 0) {
