@@ -130,6 +130,17 @@ def test_each_alarm_comes_with_its_state_and_goes(page: Page, server: PlayedServ
                 expect(row.locator(".act")).to_contain_text(act[1:])
 
 
+def test_what_halts_the_work_comes_before_what_stands_as_long_as_the_program_runs(
+    page: Page, server: PlayedServer
+) -> None:
+    server.plain_wire = True
+    visible = page.locator("#alarms li:not(.gone):visible")
+    expect(visible).to_have_attribute("data-code", "wire_plain")
+    server.controller = controller("PAUSED")
+    expect(visible).to_have_attribute("data-code", "mode_paused")
+    expect(page.locator("#more-alarms")).to_be_visible()
+
+
 def test_a_camera_that_is_found_turned_is_told_and_its_correction_is_a_press_away(
     page: Page, server: PlayedServer
 ) -> None:

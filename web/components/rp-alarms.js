@@ -39,6 +39,9 @@ const ELSEWHERE = new Set(["mode_stopped", "no_link"]);
 /** Warnings that the work waits for, or should wait for. */
 const HALTS = new Set(["mode_paused", "work_waits", "camera_looks_left", "camera_looks_right", "camera_looks_up", "camera_looks_down"]);
 
+/** As long as the program runs: what has happened since comes first. */
+const STANDING = new Set(["wire_plain"]);
+
 class RpAlarms extends HTMLElement {
   /** @type {Map<string, ReturnType<typeof newRow>>} */
   rows = new Map();
@@ -92,7 +95,9 @@ class RpAlarms extends HTMLElement {
 
 /** @param {HTMLElement} row */
 function rank(row) {
-  return row.dataset.severity === "error" ? 0 : HALTS.has(row.dataset.code ?? "") ? 1 : 2;
+  const code = row.dataset.code ?? "";
+  if (STANDING.has(code)) return 2;
+  return row.dataset.severity === "error" ? 0 : HALTS.has(code) ? 1 : 3;
 }
 
 /** @param {import("../js/state/reasons.js").Reason} reason */
