@@ -39,7 +39,8 @@ class PageFiles(StaticFiles):
         cached = {
             **scripts,
             **{f"text/{file.name}": file.read_text(encoding="utf-8") for file in (folder / "text").glob("*.json")},
-            _STYLES: "\n".join(style.read_text(encoding="utf-8") for style in styles),
+            # It lies one folder higher than they do.
+            _STYLES: "\n".join(style.read_text(encoding="utf-8") for style in styles).replace('url("../', 'url("'),
             "index.html": with_preloads(page, scripts),
         }
         self._cache = {name: text.encode() for name, text in cached.items()}

@@ -86,7 +86,9 @@ def test_the_page_asks_for_one_stylesheet_in_the_order_of_its_several_and_for_ev
     assert re.findall(r'"stylesheet" href="(.*?)"', sent) == ["page.css"]
     styles = [(folder / name).read_text(encoding="utf-8") for name in re.findall(r'"stylesheet" href="(.*?)"', written)]
     joined = ask(files, "page.css")
-    assert len(styles) > 10 and joined.body.decode() == "\n".join(styles)
+    assert len(styles) > 10 and joined.body.decode() == "\n".join(styles).replace("../", "")
+    pictures = re.findall(r'url\("(.*?)"\)', joined.body.decode())
+    assert pictures and all((folder / each).is_file() for each in pictures)
     assert joined.headers["content-type"].startswith("text/css")
     named = re.findall(r'"modulepreload" href="(.*?)"', sent)
     later = {f"components/rp-{name}.js" for name in ("review", "drive", "report", "engineer", "preview", "replay")}
