@@ -9,18 +9,18 @@ from bridge.sim.vineyard.truth import RightCut
 
 #: Half the opening of the blades: a cane whose axis is nearer than this to the cut is between them too (m).
 CANE_ROOM = 0.015
-#: Keep-out of wires, ties and hoses, from their surface (m).
+#: Keep-out of wires, hoses and posts, from their surface (m).
 WIRE_ROOM = 0.015
 #: Places tried from one end of the right stretch to the other.
 _PLACES = 9
 
-Blocker = Literal["", "cane", "wire"]
+Blocker = Literal["", "cane", "wire", "post"]
 
 
 def blocked_by(row: Row, cut: RightCut) -> Blocker:
     """What leaves no room for the blades wherever the cut is made within its right stretch; empty where there is room.
 
-    Where wires and canes share the blame, it is what is in the way of the best place.
+    Where several share the blame, it is what is in the way of the best place.
 
     Args:
         row: Before any cut.
@@ -34,16 +34,17 @@ def blocked_by(row: Row, cut: RightCut) -> Blocker:
         for _, rod in row.standing()
         if rod.kind in ("cane", "node") and (rod.vine, rod.spur, rod.cane) != cane and _near(rod, cut)
     ]
-    wires = [rod for _, rod in row.standing() if rod.kind in ("wire", "hose") and _near(rod, cut)]
+    hard = [rod for _, rod in row.standing() if rod.kind in ("wire", "hose", "post") and _near(rod, cut)]
     places = cut.least + np.linspace(0.0, 1.0, _PLACES)[:, None] * (cut.most - cut.least)
-    if not all(_blocker(place, canes, wires) for place in places):
+    if not all(_blocker(place, canes, hard) for place in places):
         return ""
-    return _blocker(cut.best, canes, wires) or _blocker(places[0], canes, wires)
+    return _blocker(cut.best, canes, hard) or _blocker(places[0], canes, hard)
 
 
-def _blocker(place: Array, canes: list[Rod], wires: list[Rod]) -> Blocker:
-    if any(_gap(rod, place)[0] - _gap(rod, place)[1] < WIRE_ROOM for rod in wires):
-        return "wire"
+def _blocker(place: Array, canes: list[Rod], hard: list[Rod]) -> Blocker:
+    for rod in hard:
+        if _gap(rod, place)[0] - _gap(rod, place)[1] < WIRE_ROOM:
+            return "post" if rod.kind == "post" else "wire"
     return "cane" if any(_gap(rod, place)[0] < CANE_ROOM for rod in canes) else ""
 
 

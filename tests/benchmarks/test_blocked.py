@@ -32,6 +32,7 @@ def test_another_cane_between_the_blades_all_along_is_in_the_way(aside, what):
 def test_a_wire_is_in_the_way_by_its_surface(aside, what):
     assert blocked_by(beside("wire", aside), CUT) == what
     assert blocked_by(beside("hose", aside), CUT) == what
+    assert blocked_by(beside("post", aside), CUT) == what.replace("wire", "post")
 
 
 @pytest.mark.parametrize("kind", ["wire", "cane"])
