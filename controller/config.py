@@ -154,6 +154,7 @@ class WorkConfig(Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         home: Survey posture of the arm (rad), with the camera facing the row.
+        survey_high: Posture of the arm (rad) on a survey's way back over Guyot vines, with the camera 0.2 m higher.
         folded: Posture of the arm folded over the base (rad), to drive far.
         reach: Initial posture of the search for a cut posture (rad), elbow aside, tool to the left.
         row_heading: Direction of the row in odom (rad); the base keeps parallel to it, the row on its left.
@@ -181,6 +182,7 @@ class WorkConfig(Struct, frozen=True, forbid_unknown_fields=True):
     """
 
     home: ArmPosture = (-0.2784, -0.1128, -0.0354, -2.0055, 1.6759, 1.2124, -0.269)
+    survey_high: ArmPosture = (-0.2659, -0.0735, -0.0319, -1.5413, 1.816, 1.3034, 0.1681)
     folded: ArmPosture = (0.0, -1.2, 0.0, -2.6, 0.0, 1.9, 0.785)
     reach: ArmPosture = (-0.3, -1.2, 1.1, -1.7, 2.25, 2.4, 0.55)
     row_heading: float = 0.0

@@ -1,8 +1,8 @@
 """`rolling-panda bench perception`: surveys of rows that nobody has seen, and the judge's opinion of every point.
 
-The robot drives along rows of up to three vines in its survey posture; every frame goes through perception as it would
-on the wire. All figures are on accepted points, that is, on every point shown; what perception left undecided is told
-apart.
+The robot drives along rows of up to three vines in its survey posture, and back over Guyot vines with the camera
+higher. Every frame goes through perception as it would on the wire. All figures are on accepted points, that is, on
+every point shown; what perception left undecided is told apart.
 """
 
 import argparse
@@ -30,6 +30,7 @@ from bridge.sim.camera.frame import camera_frame, camera_pose, survey_place
 from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
+from controller.config import WorkConfig
 from perception.config import PerceptionConfig, RuleConfig
 from perception.pipeline import Perception
 from perception.segmentation.frame import decode_frame
@@ -37,7 +38,7 @@ from perception.segmentation.segmenter import SEGMENTERS, choose_segmenter
 from rolling_panda import messages as m
 from rolling_panda.model.robot import RobotModel
 
-#: Vines of a row, and the way between two frames (m): the survey drives at 0.15 m/s, and the camera takes two a second.
+#: Vines of a row, and the way between two frames (m): two a second at the survey's default speed of 0.15 m/s.
 ROW_VINES, STEP = 3, 0.075
 #: Nodes that stay, by the kind of cut.
 KEPT = {"spur cut": 2, "cane cut": 8}
@@ -98,8 +99,12 @@ def survey_row(
     last = first + vines * config.vine_spacing
     points: tuple[m.PruningPoint, ...] = ()
     left_open: tuple[m.UndecidedSite, ...] = ()
-    for sequence, x in enumerate(np.arange(first, last + step, step) - _CAMERA_AHEAD):
-        base, position = survey_place(float(x))
+    way: list[tuple[float, tuple[float, ...] | None]]
+    way = [(x, None) for x in (np.arange(first, last + step, step) - _CAMERA_AHEAD).tolist()]
+    if guyot:
+        way += [(x, WorkConfig().survey_high) for x, _ in reversed(way)]
+    for sequence, (x, arm) in enumerate(way):
+        base, position = survey_place(x, arm)
         place = camera_pose(model, base, position)
         image = camera.render(row, place, sequence)
         frame = camera_frame(image, camera, base, position, sequence)

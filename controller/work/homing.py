@@ -1,4 +1,4 @@
-"""Motions of the arm out of the canes and back to its survey posture, with the base at rest."""
+"""Motions of the arm out of the canes and to a survey posture, with the base at rest."""
 
 import math
 
@@ -22,10 +22,10 @@ _CLEAR = 0.02
 class Homing:
     """One homing motion. Call `step` until `done`; stop calling it to stop the motion."""
 
-    def __init__(self, config: ControllerConfig, follower: Follower, dt: float) -> None:
-        """Bind the parts for a control period of `dt` (s)."""
+    def __init__(self, config: ControllerConfig, follower: Follower, dt: float, posture: Array | None = None) -> None:
+        """Bind the parts for a control period of `dt` (s); the goal is `posture` (7, rad), or the survey posture."""
         self._config, self._follower, self._dt = config, follower, dt
-        self._goal = np.array(config.work.home)
+        self._goal = np.array(config.work.home) if posture is None else posture
         heading = config.work.row_heading
         self._left = np.array([-np.sin(heading), np.cos(heading), 0.0])
         self._out: ToolMotion | None = None

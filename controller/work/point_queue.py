@@ -151,6 +151,11 @@ class PointQueue:
         return None if self.perceived is None else self.perceived.rule
 
     @property
+    def guyot(self) -> bool:
+        """Whether perception takes the vines for Guyot vines."""
+        return self._rule is not None and self._rule.system == "guyot"
+
+    @property
     def undo_refused(self) -> Reason | None:
         """Reason why the acceptances of no rule can be restored; None if those of one can."""
         return self._rules.undo_refused(self._rule)

@@ -1,7 +1,8 @@
 """The survey: a slow drive along the row with the arm in its survey posture, so that the camera sees every vine.
 
-If undecided sites need another look at the end, the robot drives back once and takes pictures from the other side. An
-operator can also send it to one undecided site: it takes pictures from both sides and from the front.
+If undecided sites need another look at the end, the robot drives back once and takes more pictures. Of Guyot vines it
+takes them from higher up, since their canes are cut higher than the first pictures reach. An operator can also send it
+to one undecided site: it takes pictures from both sides and from the front.
 """
 
 import math
@@ -19,11 +20,11 @@ from rolling_panda import reasons
 from rolling_panda.model.differential_drive import NXI, Array
 
 #: Deceleration of the base towards the end of the survey (m/s²), and tolerance of the end (m).
-_BRAKING, _NEAR = 0.2, 0.005
+_BRAKING, _NEAR = 0.4, 0.005
 #: Back to the line along the row: of the heading (1/s), and of the distance from it (1/m², times the speed squared).
 _GAIN_HEADING, _GAIN_ASIDE = 1.2, 6.0
-#: At the end of a way the last pictures are waited for (s).
-_PICTURES_S = 2.0
+#: At the end of a way the pictures that were taken on it are waited for; beside a place one is taken at rest (s).
+_PICTURES_S, _PICTURE_AT_REST_S = 0.6, 2.0
 #: Where a place is looked at again from: so far beside it along the row (m), the camera before it once.
 _SIDES = (-0.22, 0.0, 0.22)
 #: What moves by less than this in the time (m, s) is held back by something.
@@ -110,13 +111,16 @@ class Survey:
         xi = self._saturation.ramp(robot.sent)
         if self._there_at is None:
             self._there_at = now
-        if now - self._there_at < _PICTURES_S:
+        if now - self._there_at < (_PICTURES_S if self._place is None else _PICTURE_AT_REST_S):
             return StepResult(xi)
         if self._stops:
             self._goal, self._there_at, self._moved = self._stops.pop(0), None, None
             return StepResult(xi)
         if self._line is not None and not self._again and self._unclear() > 0:
             self._again, self._goal, self._there_at, self._moved = True, self._line[0], None, None
+            if self._queue.guyot:
+                high = np.array(self._config.work.survey_high)
+                self._homing = Homing(self._config, self._follower, 1.0 / self._config.rate_hz, high)
             return StepResult(xi, events=(reasons.survey_returns(self._unclear()),))
         return StepResult(xi, finished=True, summary=self._summary())
 

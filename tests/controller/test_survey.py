@@ -60,6 +60,23 @@ def test_where_places_need_another_look_it_goes_back_over_its_way_once():
     assert "1 unclear" in text_of(r.state.reason)
 
 
+@pytest.mark.parametrize(("system", "posture"), [("guyot", CONFIG.work.survey_high), ("spur", CONFIG.work.home)])
+def test_on_the_way_back_over_guyot_vines_the_camera_is_higher(system, posture):
+    assert tool_height(CONFIG.work.survey_high) - tool_height(CONFIG.work.home) == pytest.approx(0.2, abs=0.02)
+    r = surveying(0.6)
+    told = m.PruningRule(system=system)
+    r.show((), undecided_sites=(UNCLEAR,), rule=told)
+    back = []
+    run_until(r, lambda s: s is not None and s.mode == "AUTO", 1.0)
+    while r.state.mode == "AUTO":
+        assert r.now < 40.0
+        before = r.q[0]
+        r.step()
+        if r.q[0] < before - 1e-4 * r.dt:
+            back.append(np.abs(r.q[ARM_Q] - posture).max())
+    assert abs(r.q[0]) < 0.03 and len(back) > 100 and max(back) < 0.02
+
+
 def test_it_comes_back_to_its_line_when_it_begins_askew():
     r = robot()
     r.q[2] = 0.08
@@ -137,6 +154,11 @@ def test_a_place_left_open_is_looked_at_from_both_sides_and_from_before_it():
     np.testing.assert_allclose(np.diff(places), 0.22, atol=0.02)
     assert abs(places[1] - stood[-1][1]) < 0.03, "the camera is before the place once"
     assert r.state.reason == reasons.looked_again_unclear(1, 2, reasons.cane_base_hidden())
+
+
+def tool_height(arm):
+    """Height of the tool with the arm in a posture (m)."""
+    return float(ROBOT.pose(np.concatenate([np.zeros(5), arm]), ROBOT.tool_id).translation[2])
 
 
 def tool_ahead(r):
