@@ -158,6 +158,7 @@ def cuts_csv(cuts: tuple[CutReport, ...]) -> str:
         row["ended_at"] = (
             datetime.fromtimestamp(cut.ended_at, UTC).isoformat(timespec="seconds") if cut.ended_at else ""
         )
+        row["seconds"] = round(cut.seconds, 2)
         # A spreadsheet would evaluate a text with such a first character as a formula.
         writer.writerow([_escape_formula(row[name]) for name in _CUT_COLUMNS])
     return out.getvalue()

@@ -26,7 +26,7 @@ def test_everybody_who_is_signed_in_gets_the_report_and_its_cuts_as_a_table():
         outcome="DONE",
         reason=reasons.said("=1+1"),
         ended_at=1769850000.0,
-        seconds=3.25,
+        seconds=3.2549,
     )
     told = SessionReport(
         began_at=1769840000.0, written_at=1769850000.0, cuts=(cut,), cut_count=1, vines=(VineReport(vine=3, done=1),)
@@ -37,11 +37,12 @@ def test_everybody_who_is_signed_in_gets_the_report_and_its_cuts_as_a_table():
         server.wire.deliver(topics.REPORT, told)
         eventually(lambda: client.get("/api/report").status_code == 200)
         body = client.get("/api/report").json()
-        assert body["cuts"][0]["seconds"] == 3.25 and body["vines"][0]["done"] == 1
+        assert body["cuts"][0]["seconds"] == 3.2549 and body["vines"][0]["done"] == 1
         answer = client.get("/api/report.csv")
         assert answer.headers["content-type"].startswith("text/csv")
         (row,) = csv.DictReader(io.StringIO(answer.text))
         assert (row["vine"], row["outcome"], row["ended_at"]) == ("3", "DONE", "2026-01-31T09:00:00+00:00")
+        assert row["seconds"] == "3.25"
         assert row["reason"] == "'=1+1", "a spreadsheet does not take it for a formula"
         with server.visitor() as stranger:
             assert stranger.get("/api/report").status_code == 401
