@@ -8,7 +8,7 @@ from rolling_panda import reasons
 from rolling_panda.messages import page as p
 from server.api.responses import outcome
 from tests.support.page_parts import open_screen
-from tests.support.played_page import until
+from tests.support.played_page import box_of, until
 from tests.support.played_server import PlayedServer, point
 
 pytestmark = pytest.mark.browser
@@ -117,3 +117,13 @@ def test_a_mark_shows_where_the_blades_close_across_the_cane(page: Page, server:
     expect(marks).to_have_count(2)
     expect(marks.nth(0).locator("path.ring")).to_have_attribute("transform", "rotate(-90) scale(1.5)")
     expect(marks.nth(1).locator("path.ring")).to_have_attribute("visibility", "hidden")
+
+
+def test_on_a_telephone_the_picture_to_tap_comes_into_sight(page: Page, server: PlayedServer) -> None:
+    page.set_viewport_size({"width": 390, "height": 844})
+    open_screen(page, "review")
+    page.locator("#add-by-hand").scroll_into_view_if_needed()
+    picture = page.locator("rp-cut-picture")
+    assert box_of(picture)["y"] < box_of(page.locator("main"))["y"]
+    page.locator("#add-by-hand").click()
+    until(page, lambda: box_of(picture)["y"] >= box_of(page.locator("main"))["y"])

@@ -84,6 +84,8 @@ class RpReview extends HTMLElement {
     this.picture.addEventListener("move-cut", (event) => void this.moveCut(/** @type {CustomEvent} */ (event).detail.along));
     window.addEventListener("keydown", (event) => this.key(event));
     drawOn([points, pageState, link, now, current, changes, placing, decisions], () => this.draw());
+    // On a telephone the button is below the picture that is tapped then.
+    placing.subscribe((on) => on && this.picture?.scrollIntoView({ block: "nearest" }));
   }
 
   /**
