@@ -14,6 +14,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from PIL import Image
 
 from benchmarks.page.pictures_live import walk_through
@@ -31,8 +32,9 @@ FLAGS = (
     "--ignore-gpu-blocklist",
 )
 DESKTOP, TABLET, TELEPHONE = (1280, 800), (1024, 768), (390, 844)
-#: So many keep the colour of each sign; 64 made a blue tick green.
-COLOURS = 256
+#: Of a picture's palette. The most frequent ones are kept as they are where they differ enough from each other, so that
+#: a small sign keeps its own; the others are for the 3-D view and the camera's image.
+COLOURS, EXACT, APART = 256, 96, 5
 STILL = "view.jpg"
 _PATIENCE_MS = 60_000
 
@@ -72,8 +74,7 @@ class Album:
         if clip is not None and clip["width"] is None:
             raise InputError(f"{name}: nothing of {part} is to be seen on the page")
         picture = Image.open(BytesIO(page.screenshot(clip=clip))).convert("RGB")
-        small = picture.quantize(COLOURS, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
-        small.save(self.folder / f"{name}.png", optimize=True)
+        reduced(picture).save(self.folder / f"{name}.png", optimize=True)
         print(f"{name}.png", flush=True)
 
     def keep_still(self, page: Any) -> None:
@@ -83,6 +84,27 @@ class Album:
         page.evaluate(shown, False)
         page.locator("rp-scene").screenshot(path=self.folder / STILL, type="jpeg", quality=70)
         page.evaluate(shown, True)
+
+
+def reduced(picture: Image.Image) -> Image.Image:
+    """The picture in few colours."""
+    counted = picture.getcolors(picture.width * picture.height) or []
+    frequent = np.array([colour for _, colour in sorted(counted, reverse=True)[: 20 * EXACT]], dtype=np.int16)
+    exact = frequent[:1]
+    for colour in frequent[1:]:
+        if len(exact) < EXACT and (np.abs(exact - colour).max(axis=1) >= APART).all():
+            exact = np.vstack((exact, colour))
+    others = picture.quantize(COLOURS - len(exact), Image.Quantize.MEDIANCUT).getpalette() or []
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([*exact.reshape(-1).tolist(), *others])
+    small = picture.quantize(palette=palette, dither=Image.Dither.NONE)
+    # Pillow looks for the nearest one only roughly.
+    places = np.asarray(small).copy()
+    pixels = np.asarray(picture, dtype=np.int32) @ np.array((1 << 16, 1 << 8, 1), dtype=np.int32)
+    for place, (red, green, blue) in enumerate(exact.tolist()):
+        places[pixels == (red << 16) + (green << 8) + blue] = place
+    small.frombytes(places.tobytes())
+    return small
 
 
 _BOX = """part => {

@@ -2,10 +2,13 @@
 
 from typing import Any, Protocol
 
+from rolling_panda.errors import InputError
 from tests.support.processes.demo import Demo
 
 #: So many points are accepted: enough to see the work, and soon done.
 FEW = 4
+#: So often, every 0.3 s, it is looked whether work goes on.
+_PAUSES = 400
 
 
 class Keeps(Protocol):
@@ -54,6 +57,17 @@ def _open(page: Any, screen: str) -> None:
     page.locator(f"rp-{screen}:defined").wait_for()
 
 
+def _resumed(page: Any, wanted: str) -> None:
+    """Wait for something; work that a busy machine has paused goes on."""
+    for _ in range(_PAUSES):
+        if not page.locator("#to-continue").is_visible() and page.locator(wanted).first.is_visible():
+            return
+        if page.locator("#to-continue").is_visible():
+            _press(page, "#to-continue")
+        page.wait_for_timeout(300)
+    raise InputError(f"the work did not get to {wanted}")
+
+
 def _find(page: Any, album: Keeps) -> None:
     page.locator("rp-scene iframe.loaded").wait_for()
     page.locator("[data-cut]").nth(2).wait_for()
@@ -64,7 +78,7 @@ def _find(page: Any, album: Keeps) -> None:
     _mode(page, "READY")
     page.locator("[data-cut] button").first.click()
     page.locator(".work-picture.loaded").wait_for()
-    _rest(page)
+    _rest(page, 10.0)
     album.take(page, "live-points")
 
 
@@ -80,7 +94,9 @@ def _preview(page: Any, album: Keeps) -> None:
     page.locator('#approve-preview[aria-disabled="false"]').wait_for()
     slider = page.locator("#preview-time")
     slider.fill(str(0.6 * float(slider.get_attribute("max"))))
-    _rest(page)
+    # From where the transparent robot is in sight.
+    page.locator('[data-preset="follow"]').click()
+    _rest(page, 10.0)
     album.take(page, "live-preview")
     _press(page, "#approve-preview")
     page.locator("#close-preview").click()
@@ -89,9 +105,9 @@ def _preview(page: Any, album: Keeps) -> None:
 def _work(page: Any, album: Keeps) -> None:
     _press(page, "#start")
     _mode(page, "AUTO")
-    page.locator('[data-cut][data-state="CUTTING"], [data-cut][data-state="DONE"]').first.wait_for()
+    _resumed(page, '[data-cut][data-state="CUTTING"], [data-cut][data-state="DONE"]')
     album.take(page, "live-running")
-    _mode(page, "READY")
+    _resumed(page, ".next #to-review")
 
 
 def _charts_and_report(page: Any, album: Keeps) -> None:
@@ -106,7 +122,7 @@ def _charts_and_report(page: Any, album: Keeps) -> None:
 def _by_hand(page: Any, album: Keeps) -> None:
     _open(page, "drive")
     _press(page, "#teleop")
-    _rest(page)
+    _rest(page, 10.0)
     # A browser that draws in software may be silent for so long that its control has ended.
     page.wait_for_function("!document.querySelector('rp-toasts .toast')")
     album.take(page, "live-teleoperate")

@@ -3,6 +3,7 @@
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from PIL import Image
 from playwright.sync_api import Page
@@ -26,6 +27,15 @@ def test_a_picture_is_of_the_part_that_matters_in_few_colours(page: Page, tmp_pa
         assert part.width == pytest.approx(work["x"] + work["width"] - camera["x"] + 16, abs=2)
         assert part.height == pytest.approx(work["height"] + 16, abs=2)
         assert len(part.convert("RGB").getcolors() or ()) in range(16, pictures.COLOURS + 1)
+
+
+def test_a_small_sign_keeps_its_colour_beside_a_large_picture() -> None:
+    rng = np.random.default_rng(0)
+    picture = Image.fromarray(rng.integers(0, 256, (400, 600, 3), dtype=np.uint8))
+    picture.paste((255, 255, 255), (0, 0, 600, 40))
+    picture.paste((135, 83, 0), (10, 10, 22, 22))
+    small = pictures.reduced(picture).convert("RGB")
+    assert small.getpixel((300, 30)) == (255, 255, 255) and small.getpixel((15, 15)) == (135, 83, 0)
 
 
 def test_every_state_is_pictured_and_the_folder_is_small() -> None:
