@@ -70,6 +70,8 @@ def _resumed(page: Any, wanted: str) -> None:
 
 def _find(page: Any, album: Keeps) -> None:
     page.locator("rp-scene iframe.loaded").wait_for()
+    # Drawn, not only there.
+    page.locator("rp-scene .empty").wait_for(state="hidden", timeout=180_000)
     page.locator("[data-cut]").nth(2).wait_for()
     page.locator("rp-camera img").wait_for()
     _rest(page, 8.0)
