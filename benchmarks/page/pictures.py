@@ -94,9 +94,14 @@ def reduced(picture: Image.Image) -> Image.Image:
     for colour in frequent[1:]:
         if len(exact) < EXACT and (np.abs(exact - colour).max(axis=1) >= APART).all():
             exact = np.vstack((exact, colour))
-    others = picture.quantize(COLOURS - len(exact), Image.Quantize.MEDIANCUT).getpalette() or []
+    left = COLOURS - len(exact)
+    # Half of them by how much they fill, half by how much they differ.
+    others = [
+        *(picture.quantize(left - left // 2, Image.Quantize.MEDIANCUT).getpalette() or []),
+        *(picture.quantize(left // 2, Image.Quantize.MAXCOVERAGE).getpalette() or []),
+    ]
     palette = Image.new("P", (1, 1))
-    palette.putpalette([*exact.reshape(-1).tolist(), *others])
+    palette.putpalette([*exact.reshape(-1).tolist(), *others][: 3 * COLOURS])
     small = picture.quantize(palette=palette, dither=Image.Dither.NONE)
     # Pillow looks for the nearest one only roughly.
     places = np.asarray(small).copy()
