@@ -30,6 +30,7 @@ BENCHMARKS = {
     "record": ("benchmarks.control.record", "what a recorder beside the demo costs the control"),
     "live": ("benchmarks.control.live", "the running demo: control periods on time, round trip, tool error"),
     "perception": ("benchmarks.perception.survey", "surveys of unseen rows, every pruning point judged"),
+    "localise": ("benchmarks.perception.localise", "out along the row and back: where is a place that was seen before"),
     "photographs": ("benchmarks.perception.photographs", "classes of photographs, against masks that people drew"),
     "familiarity": (
         "benchmarks.perception.familiarity",

@@ -237,6 +237,7 @@ class PerceptionConfig(Struct, frozen=True, forbid_unknown_fields=True):
         segmenter: `network`, or `labels` for the label image of the simulated camera.
         weights: ONNX file of the network; empty for the one of `rolling-panda models use`, else the shipped one.
         threads: Threads of the network.
+        localise: Whether wood that was seen before corrects the odometry; otherwise map and odom are one.
         fuse: Whether the rule is applied to the map of a spur over all frames, or to each frame alone.
         rule: Pruning rule.
         skeleton: From pixels to canes.
@@ -253,6 +254,7 @@ class PerceptionConfig(Struct, frozen=True, forbid_unknown_fields=True):
     segmenter: Literal["network", "labels"] = "network"
     weights: str = ""
     threads: Annotated[int, Meta(ge=1, le=64)] = 2
+    localise: bool = False
     fuse: bool = False
     rule: RuleConfig = RuleConfig()
     skeleton: SkeletonConfig = SkeletonConfig()

@@ -15,7 +15,7 @@ from perception.segmentation.frame import CorruptFrameError
 from rolling_panda import messages as m
 from rolling_panda import reasons, topics
 from rolling_panda.errors import RollingPandaError
-from rolling_panda.messages.perception import CameraState, CloseUpResult, Obstacles, SpurPicture
+from rolling_panda.messages.perception import CameraState, CloseUpResult, Localisation, Obstacles, SpurPicture
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.transport.inbox import Inbox, Received, Reply, Request
 from rolling_panda.transport.runner import Runner, Wire
@@ -89,6 +89,7 @@ class _Output:
     rejected_wood: tuple[m.Reason, ...]
     reply: Reply | None
     camera: CameraState
+    localisation: Localisation
 
 
 class PerceptionProcess:
@@ -120,6 +121,8 @@ class PerceptionProcess:
         self._sequence = 0
         self._camera = perception.camera.state
         self._camera_told: CameraState | None = None
+        self._localisation_sent = -1e9
+        self._localisation_told: Localisation | None = None
         self._obstacles_sent = self._picture_sent = self._rejected_logged = -1e9
         self._started = False
         self._last_error = ""
@@ -165,6 +168,7 @@ class PerceptionProcess:
             self._out.append(self._picture_cycle[key])
             self._picture_sent = now
         self._tell_camera(now)
+        self._tell_localisation(now)
         self._beat(now)
         return self._out
 
@@ -215,6 +219,18 @@ class PerceptionProcess:
         self._camera_told = camera
         self._out.append(camera)
 
+    def _tell_localisation(self, now: float) -> None:
+        if self._newest is None:
+            return
+        localisation, told = self._newest.localisation, self._localisation_told
+        changed = told is None or (told.state, told.T_map_odom) != (localisation.state, localisation.T_map_odom)
+        if not changed and now - self._localisation_sent < 1.0 / topics.LOCALISATION.rate_hz:
+            return
+        if localisation.reason is not None and (told is None or told.state != "lost"):
+            self._log(localisation.reason, now)
+        self._localisation_sent, self._localisation_told = now, localisation
+        self._out.append(localisation)
+
     def _log_refused(self, cause: m.Reason, now: float) -> None:
         # An error that repeats frame after frame is logged once.
         if cause.code != self._last_error:
@@ -260,4 +276,5 @@ def _work(perception: Perception, job: CameraFrame | Request, send: Callable[[Cl
         perception.rejected_wood,
         reply,
         perception.camera.state,
+        perception.localisation,
     )

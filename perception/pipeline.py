@@ -11,11 +11,12 @@ from msgspec.structs import replace
 from perception.arrays import Array, Labels, distance
 from perception.calibration.camera import CameraCalibration, Keep, keep_nothing
 from perception.config import PerceptionConfig, RuleConfig
+from perception.localisation.row_frame import RowFrame
 from perception.obstacles.cylinder_fit import Rejection
 from perception.obstacles.obstacle_map import ObstacleMap
 from perception.plant.capsules import CapsuleSet
 from perception.plant.map import PlantMap
-from perception.plant.model import Spur
+from perception.plant.model import Plant, Spur
 from perception.plant.numbering import SpurNumber, SpurNumbering
 from perception.plant.undecided_sites import UndecidedSites, undecided_site
 from perception.rules.keep_out import frame_keep_out, map_keep_out
@@ -24,7 +25,7 @@ from perception.rules.pruning import Decision, apply_rule
 from perception.segmentation.frame import CORDON, UnusablePictureError, View, decode_frame
 from perception.segmentation.network_segmenter import NetworkSegmenter
 from perception.segmentation.segmenter import Segmenter
-from perception.skeleton.topology import perceive_plant
+from perception.skeleton.topology import perceive_plant, trace_canes
 from perception.tracking.camera_rays import CameraRays, Ray
 from perception.tracking.close_up import AROUND, check_close_up, failed_check
 from perception.tracking.retained_canes import RetainedCanes
@@ -43,7 +44,15 @@ from rolling_panda.commands import (
     UndoRule,
     UseCamera,
 )
-from rolling_panda.messages.perception import CALIBRATION, CHECK, CameraMount, Capsule, CloseUpResult, SpurPicture
+from rolling_panda.messages.perception import (
+    CALIBRATION,
+    CHECK,
+    CameraMount,
+    Capsule,
+    CloseUpResult,
+    Localisation,
+    SpurPicture,
+)
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.model.wire_values import vector3
@@ -128,8 +137,9 @@ class Perception:
         self.plant_map = PlantMap()
         self.withdrawn: tuple[m.Reason, ...] = ()
         """Points withdrawn by the last frame, with the reasons."""
-        self.obstacles: tuple[Capsule, ...] = ()
-        """Obstacle map with the retained canes."""
+        self._wood: tuple[Capsule, ...] = ()
+        """Obstacle map with the retained canes, in map."""
+        self.row_frame = RowFrame(config.localise)
         self._handlers: dict[type[PlantRequest], Callable[[Any], m.Answer]] = {
             SetRule: self._set_rule,
             EvaluateRule: self._try_rule,
@@ -153,6 +163,7 @@ class Perception:
         view = decode_frame(frame, self._model)
         self._stamp = view.stamp
         self.camera_rays.add(frame)
+        self.row_frame.predict(_base(frame), view.stamp)
         self.withdrawn = ()
         # The calibration's board hides the row.
         if frame.point_id.startswith(CALIBRATION) or -view.R[2, 1] < self._config.min_upright:
@@ -164,13 +175,22 @@ class Perception:
             return replace(self.points(), canes=())
         self._frames += 1
         if (unfamiliar := self.segmenter.unfamiliar) is not None:
-            return self._process_unfamiliar(view, labels, unfamiliar)
+            return self._process_unfamiliar(self.row_frame.in_map(view), labels, unfamiliar)
         self._unfamiliar_frames = 0
-        cylinders = self._obstacle_map.update(view, labels)
         if self._is_survey(view, labels):
-            self._survey(view, labels, cylinders, np.array([frame.base.x, frame.base.y, frame.base.phi]))
+            plant = perceive_plant(view, labels, self._config.skeleton)
+            canes = [cane for spur in plant.spurs for cane in spur.canes]
+            self.camera.observe(view, _base(frame), [cane.axis for cane in canes])
+            self.row_frame.update(view, labels, canes)
+            if self.row_frame.lost is not None:
+                return self._process_unfamiliar(self.row_frame.in_map(view), labels, self.row_frame.lost)
+            self._survey(self.row_frame.in_map(view), labels, self.row_frame.plant_in_map(plant))
+        elif self.row_frame.lost is not None:
+            return self._process_unfamiliar(self.row_frame.in_map(view), labels, self.row_frame.lost)
         else:
             # Too near or too far to read whole spurs, but it may show that wood is gone.
+            view = self.row_frame.in_map(view)
+            cylinders = self._obstacle_map.update(view, labels)
             self._apply(self._tracker.update(view, labels, []))
             self._update_obstacles(view, labels, cylinders, ())
             self._site_messages = (undecided_site(self._no_survey()),)
@@ -179,26 +199,25 @@ class Perception:
         return self.points()
 
     def _process_unfamiliar(self, view: View, labels: Labels, reason: m.Reason) -> m.PruningPoints:
-        """Points after a frame whose classes are doubtful: it adds obstacles, and removes and proposes nothing."""
+        """Points after a frame of doubtful classes or place: it adds obstacles, and removes and proposes nothing."""
         cylinders = self._obstacle_map.update(view, labels, only_add=True)
-        canes = tuple(capsule for capsule in self.obstacles if capsule.kind == "cane")
-        obstacles = (cylinders + canes)[: self._config.obstacles.max_capsules]
-        self.obstacles = self.obstacles if obstacles == self.obstacles else obstacles
+        canes = tuple(capsule for capsule in self._wood if capsule.kind == "cane")
+        wood = (cylinders + canes)[: self._config.obstacles.max_capsules]
+        self._wood = self._wood if wood == self._wood else wood
         self._unfamiliar_frames += 1
         if self._unfamiliar_frames < _UNFAMILIAR_FRAMES:
             return self.points()
         self._site_messages = (undecided_site(reason),)
         return replace(self.points(), canes=())
 
-    def _survey(self, view: View, labels: Labels, cylinders: tuple[Capsule, ...], base: Array) -> None:
-        """Update plant map, points and obstacles from a survey frame, taken with the base at a pose (3, odom)."""
-        plant = perceive_plant(view, labels, self._config.skeleton)
-        self.camera.observe(view, base, [cane.axis for spur in plant.spurs for cane in spur.canes])
+    def _survey(self, view: View, labels: Labels, plant: Plant) -> None:
+        """Update plant map, points and obstacles from a survey frame and its plant, in map."""
+        cylinders = self._obstacle_map.update(view, labels)
         numbers = self._numbering.number(plant, view.R[:, 0])
         spurs = self.plant_map.update(plant, numbers)
         self._spur_pictures.add(view, plant, numbers)
         fused = {spur.number: spur.as_spur() for spur in self.plant_map.spurs} if self._config.fuse else {}
-        keep_out = frame_keep_out(view, labels, self.obstacles, self._config.rule)
+        keep_out = frame_keep_out(view, labels, self._wood, self._config.rule)
         proposals = []
         for seen, spur, number in zip(plant.spurs, spurs, numbers, strict=True):
             decision = apply_rule(fused.get(number, spur), self._config.rule, plant.other_canes(seen), keep_out)
@@ -234,14 +253,24 @@ class Perception:
         if point is None:
             return failed_check(frame, reasons.point_unknown_to_perception())
         view = decode_frame(frame, self._model)
+        self.row_frame.predict(_base(frame), view.stamp)
         try:
+            if self.row_frame.uncertain:
+                self._locate(view)
+            view = self.row_frame.in_map(view)
             known = self.plant_map.around(np.array(point.position), AROUND)
-            check = check_close_up(view, self.segmenter, point, frame.number, self._config, known)
+            lift = self.row_frame.lift(np.array(point.position))
+            check = check_close_up(view, self.segmenter, point, frame.number, self._config, known, lift)
         except UnusablePictureError as error:
             return failed_check(frame, error.reason)
         if check.position is not None and check.tangent is not None:
             self._tracker.refine(point.point_id, np.array(check.position), np.array(check.tangent))
-        return check
+        return self.row_frame.check_in_odom(check)
+
+    def _locate(self, view: View) -> None:
+        """Find where the robot is from a close-up frame: the base has moved since it was known."""
+        labels = self.segmenter.segment(view)
+        self.row_frame.update(view, labels, trace_canes(view, labels, self._config.skeleton))
 
     @property
     def config(self) -> PerceptionConfig:
@@ -263,11 +292,21 @@ class Perception:
             header=m.Header(self._stamp, "odom"),
             segmenter=self.segmenter.name,
             frames=self._frames,
-            points=self._with_distances(points),
-            undecided_sites=self._site_messages,
-            canes=self._cane_lines,
+            points=self.row_frame.points_in_odom(self._with_distances(points)),
+            undecided_sites=self.row_frame.sites_in_odom(self._site_messages),
+            canes=self.row_frame.lines_in_odom(self._cane_lines),
             rule=_rule_message(self._config.rule),
         )
+
+    @property
+    def obstacles(self) -> tuple[Capsule, ...]:
+        """Obstacle map with the retained canes, in odom; the same object while there is no news."""
+        return self.row_frame.capsules_in_odom(self._wood)
+
+    @property
+    def localisation(self) -> Localisation:
+        """Where the robot is in the row."""
+        return self.row_frame.message(self._stamp)
 
     @property
     def familiarity_unknown(self) -> bool:
@@ -283,7 +322,7 @@ class Perception:
         """The points with their distances to wires and cordons."""
         positions = np.array([point.position for point in points]).reshape(-1, 3)
         wires, cordons = (
-            [None if np.isinf(d) else d for d in CapsuleSet(self.obstacles, (kind,)).nearest(positions).tolist()]
+            [None if np.isinf(d) else d for d in CapsuleSet(self._wood, (kind,)).nearest(positions).tolist()]
             for kind in ("wire", "cordon")
         )
         return tuple(
@@ -298,21 +337,25 @@ class Perception:
             self.withdrawn = self._tracker.withdraw_all()
             self.plant_map, self._spur_pictures, self._undecided = PlantMap(), SpurPictures(), UndecidedSites()
             self._undo, self._severed, self._cane_lines, self._site_messages = [], [], (), ()
+            self.row_frame.forget()
         return answer
 
     def _add(self, request: AddPoint) -> m.Answer:
-        return self._place(Ray(np.array(request.origin), np.array(request.direction)), request.user)
+        ray = Ray(np.array(request.origin), np.array(request.direction))
+        return self._place(self.row_frame.ray_in_map(ray), request.user)
 
     def _add_in_image(self, request: AddPointInImage) -> m.Answer:
         at = request.sequence, request.u, request.v
-        ray = self._spur_pictures.ray(*at) or self.camera_rays.ray(*at, self._model)
+        ray = self._spur_pictures.ray(*at)
+        if ray is None and (seen := self.camera_rays.ray(*at, self._model)) is not None:
+            ray = self.row_frame.ray_in_map(seen)
         return _refused(reasons.picture_too_old()) if ray is None else self._place(ray, request.user)
 
     def _place(self, ray: Ray, user: str) -> m.Answer:
         length = float(np.linalg.norm(ray.direction))
         if length < _MIN_NORM:
             return _refused(reasons.ray_without_direction())
-        found = place_cut(self.plant_map, ray.origin, ray.direction / length, self._config.rule, self.obstacles, user)
+        found = place_cut(self.plant_map, ray.origin, ray.direction / length, self._config.rule, self._wood, user)
         if isinstance(found, m.Reason):
             return _refused(found)
         for point in self._tracker.points():
@@ -327,7 +370,7 @@ class Perception:
         if point.kind == "renewal cut":
             return _refused(reasons.renewal_cut_fixed())
         position = np.array(point.position)
-        cut = move_cut(self.plant_map, position, request.along, self._config.rule, self.obstacles, request.user)
+        cut = move_cut(self.plant_map, position, request.along, self._config.rule, self._wood, request.user)
         if isinstance(cut, m.Reason):
             return _refused(cut)
         return _done(self._tracker.move(request.point_id, cut).reason)
@@ -405,7 +448,7 @@ class Perception:
     def _decide(self, rule: RuleConfig) -> list[tuple[Spur, SpurNumber, Decision]]:
         """Decisions of a rule for all mapped spurs."""
         spurs = {known.number: known.as_spur() for known in self.plant_map.spurs}
-        keep_out = map_keep_out(self.obstacles, rule)
+        keep_out = map_keep_out(self._wood, rule)
         decisions = []
         for number, spur in spurs.items():
             axes = [cane.axis for other in spurs.values() if other is not spur for cane in other.canes]
@@ -440,7 +483,7 @@ class Perception:
             cuts = self._tracker.published_cuts()
             obstacles += self._retained_canes.update(view, labels, seen, cuts, self._config.rule, room)
         # Without news the object stays the same.
-        self.obstacles = self.obstacles if obstacles == self.obstacles else obstacles
+        self._wood = self._wood if obstacles == self._wood else obstacles
 
     def _is_survey(self, view: View, labels: Labels) -> bool:
         """Whether the cordon is seen from a distance at which whole spurs can be read."""
@@ -452,6 +495,10 @@ class Perception:
 
     def _no_survey(self) -> m.Reason:
         return reasons.no_cordon_in_range(self._config.survey_min_depth, self._config.survey_max_depth)
+
+
+def _base(frame: CameraFrame) -> Array:
+    return np.array([frame.base.x, frame.base.y, frame.base.phi])
 
 
 def with_width_bias(config: PerceptionConfig, width_bias: float) -> PerceptionConfig:

@@ -281,6 +281,31 @@ def waits_for_picture(limit_s: float) -> None:
     """The robot stands until a newer camera frame comes: the newest one is more than {limit_s:g} s old."""
 
 
+@_reason("warning", "drive to vines that it has seen, and let the camera look at them")
+def lost_in_row(cause: Reason) -> None:
+    """The robot does not know where it is in the row: {cause}."""
+
+
+@_reason("warning", "")
+def lost_by_clock() -> None:
+    """The camera's clock has begun anew."""
+
+
+@_reason("warning", "")
+def lost_by_odometry() -> None:
+    """The odometry has jumped."""
+
+
+@_reason("warning", "")
+def lost_among_others() -> None:
+    """The camera shows other wood than was seen here before."""
+
+
+@_reason("warning", "")
+def lost_by_way(metres: float) -> None:
+    """No known wood was recognised for {metres:.1f} m."""
+
+
 @_reason("warning", "start it again")
 def process_gone(process: str) -> None:
     """The {process} process is gone."""

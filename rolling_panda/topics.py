@@ -196,6 +196,10 @@ CAMERA_STATE = Topic(
     "perception/camera", perception.CameraState, "perception", "server", 0.5, "DATA_LOW", "DROP",
     "calibration of the camera, and the monitor's estimate of its error; also at once on change", latched=True,
 )
+LOCALISATION = Topic(
+    "perception/localisation", perception.Localisation, "perception", "controller", 1, "DATA_LOW", "DROP",
+    "odom in map with its covariance, and whether the robot is lost; also at once on change", latched=True,
+)
 SCENERY = Topic(
     "scenery", perception.Scenery, "bridge", "server", 0.5, "BACKGROUND", "DROP",
     "the simulated row; for display only", latched=True,
@@ -208,6 +212,7 @@ REPLAY = Topic(
 TOPICS: tuple[Topic[Any], ...] = (
     MOTION, TOKEN, CUT, CLOSE_UP_REQUEST, STOP, TELEOP, JOINTS, ODOMETRY, BRIDGE, CONTROLLER, PLAN, REPORT, TIMELINE,
     PROGRAM, HEARTBEAT, EVENT, CAMERA, PREVIEW, PREVIEW_MOTION, POINTS, PICTURES, CLOSE_UP, OBSTACLES, CAMERA_STATE,
+    LOCALISATION,
     SCENERY, PRESENCE, CONTROL, STOPS, HARDWARE_STOP, REPLAY,
 )
 #: The topic of each type of message.

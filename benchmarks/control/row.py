@@ -60,6 +60,7 @@ def cut_row(
     segmenter: str = "",
     world: WorldConfig = CALM,
     checked: bool = False,
+    localise: bool = False,
 ) -> RowRun:
     """Survey from the start posture, accept up to `points` of what was detected, work through them.
 
@@ -76,6 +77,7 @@ def cut_row(
         looks: False cuts without the closer looks before and after.
         segmenter: In place of the configured one.
         checked: The camera is checked first, and a correction that is offered is used.
+        localise: Perception corrects the odometry by the wood that it has seen.
         world: Disturbances. Where `odom` drifts, `distance`, `tool_error` and `path_rms` are no truth.
     """
     errors: list[float] = []
@@ -91,7 +93,7 @@ def cut_row(
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "trace"
-        config = sim_config(Path(folder) / "row.toml", pictures, world)
+        config = sim_config(Path(folder) / "row.toml", pictures, world, {"perception": {"localise": localise}})
         with ClosedLoop(seed, path, config, method, watch, plans, looks, segmenter) as loop:
             touches, wanted = CaneTouches(staying_rods(row_of(loop))), wanted_cuts(row_of(loop))
             warned = _check_camera(loop) if checked else ""
@@ -291,6 +293,7 @@ def main(argv: Sequence[str]) -> int:
     )
     parser.add_argument("--no-looks", action="store_true", help="cut without the closer looks before and after")
     parser.add_argument("--segmenter", default="", choices=SEGMENTERS, help="in place of the configured one")
+    parser.add_argument("--localise", action="store_true", help="with the place in the row estimated")
     parser.add_argument("--stages", action="store_true", help="say where the time of a cut goes")
     parser.add_argument("--no-plan", action="store_true", help="work along the row without the session's plan")
     parser.add_argument("--plot", type=Path, metavar="FILE", help="draw the time of a cut by method and stage (PNG)")
@@ -310,6 +313,7 @@ def main(argv: Sequence[str]) -> int:
                 not arguments.no_plan,
                 not arguments.no_looks,
                 arguments.segmenter,
+                localise=arguments.localise,
             )
             runs.append(run)
             tell(run, (run.work_s + _SURVEY_S) / (time.perf_counter() - begin))
@@ -330,6 +334,7 @@ def main(argv: Sequence[str]) -> int:
         "pictures_hz": arguments.pictures,
         "looks": not arguments.no_looks,
         "segmenter": arguments.segmenter,
+        "localise": arguments.localise,
         "summary": summary,
         "results": [asdict(run) for run in runs],
     }

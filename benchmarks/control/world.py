@@ -116,6 +116,7 @@ def main(argv: Sequence[str]) -> int:
     parser.add_argument("--points", type=_count, default=4, help="most points accepted in a row (default: 4)")
     parser.add_argument("--pictures", type=float, default=0.7, help="pictures a second in motion (default: 0.7)")
     parser.add_argument("--check-camera", action="store_true", help="check the camera first, and use the correction")
+    parser.add_argument("--localise", action="store_true", help="with the place in the row estimated")
     parser.add_argument("--segmenter", default="", choices=SEGMENTERS, help="in place of the configured one")
     words = parser.parse_args(argv)
     if words.each and words.knob:
@@ -134,6 +135,7 @@ def main(argv: Sequence[str]) -> int:
                 segmenter=words.segmenter,
                 world=case.world,
                 checked=words.check_camera,
+                localise=words.localise,
             )
             runs.append(run)
             results += [{"disturbance": case.name, "level": case.level, **asdict(cut)} for cut in run.cuts]
@@ -163,6 +165,7 @@ def main(argv: Sequence[str]) -> int:
                 "pictures_hz": words.pictures,
                 "segmenter": words.segmenter,
                 "camera_checked": words.check_camera,
+                "localise": words.localise,
                 "rows": words.count,
                 "first_seed": words.seed,
                 "summary": summary,

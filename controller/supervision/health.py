@@ -9,7 +9,7 @@ from msgspec import Struct
 
 from controller.config import SupervisionConfig
 from rolling_panda import reasons, topics
-from rolling_panda.messages.perception import Obstacles
+from rolling_panda.messages.perception import Localisation, Obstacles
 from rolling_panda.messages.robot import BridgeState, JointState, Odometry
 from rolling_panda.messages.types import Mode, Reason
 from rolling_panda.transport.inbox import Inbox, Received
@@ -31,6 +31,7 @@ class Health(Struct, frozen=True):
         ledger: Reason why the ledger cannot record; None if it can.
         tracking_error: Tracking error above its limit; None without one.
         obstacles: Age of the camera frame behind the obstacles.
+        lost: Why the place in the row is unknown.
         unfelt: Why contacts are no longer felt; None if they are, or never were.
         contact: What was touched beyond a limit, until the robot has gone back from it; None without one.
     """
@@ -47,6 +48,7 @@ class Health(Struct, frozen=True):
     ledger: Reason | None = None
     tracking_error: Reason | None = None
     obstacles: float = 0.0
+    lost: Reason | None = None
     unfelt: Reason | None = None
     contact: Reason | None = None
 
@@ -89,6 +91,7 @@ def health(
         ledger=ledger,
         tracking_error=tracking_error,
         obstacles=_picture_age(inbox.newest(Obstacles), joints, now),
+        lost=_lost(inbox.newest(Localisation)),
         unfelt=unfelt,
         contact=contact,
     )
@@ -96,6 +99,10 @@ def health(
 
 def _refused(bridge: BridgeState) -> int:
     return sum(each.count for each in bridge.rejections if each.topic == topics.MOTION.name)
+
+
+def _lost(localisation: Received[Localisation] | None) -> Reason | None:
+    return None if localisation is None else localisation.message.reason
 
 
 def _picture_age(obstacles: Received[Obstacles] | None, joints: Received[JointState] | None, now: float) -> float:
@@ -196,7 +203,8 @@ def perception(health: Health, config: SupervisionConfig, waited_s: float = 0.0)
     """
     if health.obstacles > config.obstacles_max_age_s + waited_s:
         return _stale(reasons.obstacles_stale, health.obstacles, config.obstacles_max_age_s, topics.OBSTACLES.name)
-    return _process("perception", health.perception, config.perception_max_age_s, health.present)
+    why = _process("perception", health.perception, config.perception_max_age_s, health.present)
+    return why or health.lost
 
 
 def _stale(too_old: Callable[[float, float], Reason], age: float, limit: float, topic: str) -> Reason:

@@ -64,6 +64,7 @@ def check_close_up(
     number: int,
     config: PerceptionConfig,
     known: Surroundings = NOTHING_KNOWN,
+    lift: float = 0.0,
 ) -> CloseUpResult:
     """Check one point in a close-up frame.
 
@@ -74,6 +75,8 @@ def check_close_up(
         number: Of the request.
         config: Section `[perception]`.
         known: Canes and nodes that the map has around the point; without any, the picture counts as not shifted.
+        lift: By how much the picture was shifted up or down beforehand (m). Canes tell a shift across, but not along:
+            as after any shift, the last kept node has to be seen.
 
     Raises:
         UnusablePictureError: The image is blank.
@@ -109,7 +112,7 @@ def check_close_up(
     labels = segmenter.segment(part)
     lines = trace_canes(part, labels, config.skeleton)
     shift = picture_shift(known, lines, position, along)
-    moved = 0.0 if shift is None else float(np.linalg.norm(shift))
+    moved = lift + (0.0 if shift is None else float(np.linalg.norm(shift)))
     position = position if shift is None else position + shift
     beyond = wood_presence(part, labels, position + limits.probe_distance * along)[0]
     cane = _cane_at(position, along, lines, limits)

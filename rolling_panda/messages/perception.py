@@ -20,6 +20,7 @@ from rolling_panda.messages.types import (
     Name,
     Need,
     NonNegative,
+    Pose,
     QuatXyzw,
     Reason,
     Text,
@@ -253,6 +254,31 @@ class CloseUpResult(Message, frozen=True, kw_only=True):
     tangent: UnitVector3 | None = None
     distance: NonNegative = 0.0
     nodes: tuple[Finite, ...] = ()
+
+
+class Localisation(Message, frozen=True, kw_only=True):
+    """Perception → controller: where the robot is in the row.
+
+    The wood stands still in map, against which odom drifts. All other messages are in odom, by the transform in use
+    when they were made: it may jump, and places with it.
+
+    Attributes:
+        header: Stamp of the newest frame; `frame_id` is map.
+        state: `off`: not estimated, map and odom are one; `odometry`: no wood was recognised yet; `located`; `lost`.
+        T_map_odom: Pose of odom in map, in use.
+        covariance: Of x, y (m) and the heading (rad) of the base relative to the wood nearby.
+        way: Way since wood was last recognised (m).
+        bodies: Number of canes, posts and trunks that were recognised then.
+        reason: Why the robot is lost; None otherwise.
+    """
+
+    header: Header
+    state: Literal["off", "odometry", "located", "lost"]
+    T_map_odom: Pose
+    covariance: Covariance
+    way: NonNegative = 0.0
+    bodies: Count = 0
+    reason: Reason | None = None
 
 
 #: Number of a vine or a spur; -1 for none.

@@ -55,7 +55,7 @@ def test_shares_are_of_the_accepted_and_of_the_cuts_that_were_made() -> None:
 def test_what_was_run_is_on_disk_and_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     worlds: list[tuple[int, WorldConfig]] = []
 
-    def worked_off(seed, points, method, pictures, segmenter, world, checked):
+    def worked_off(seed, points, method, pictures, segmenter, world, checked, localise):
         worlds.append((seed, world))
         return run() if world.depth_lost == PRESETS["storm"].depth_lost else run(cut(), cut(right=world == CALM))
 

@@ -7,7 +7,7 @@ from controller.config import SupervisionConfig
 from controller.supervision.health import Health, Verdict, cause, check, health
 from rolling_panda import messages as m
 from rolling_panda import reasons, topics
-from rolling_panda.messages.perception import Obstacles
+from rolling_panda.messages.perception import Localisation, Obstacles
 from rolling_panda.messages.robot import RejectionCount
 from rolling_panda.transport.inbox import Inbox
 from tests.support.fake_wire import bridge_state, joints
@@ -141,6 +141,26 @@ def test_with_an_old_picture_of_what_stands_around_automatic_work_alone_stands_a
     never = verdict("AUTO", obstacles=math.inf)
     assert never == Verdict("pause", reasons.nothing_received(topics.OBSTACLES.name))
     assert verdict("TELEOP", obstacles=6.5) is None
+
+
+def test_a_robot_that_is_lost_in_the_row_pauses_automatic_work_alone():
+    lost = reasons.lost_in_row(reasons.lost_among_others())
+    assert verdict("AUTO", lost=lost) == Verdict("pause", lost)
+    assert verdict("TELEOP", lost=lost) is None and verdict("READY", lost=lost) is None
+    inbox = Inbox()
+    assert health(inbox, False, 0.0).lost is None, "perception that does not tell has nothing against the work"
+    for state, reason in (("lost", lost), ("located", None)):
+        inbox.put(
+            Localisation(
+                header=m.Header(1.0, "map"),
+                state=state,
+                T_map_odom=m.Pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)),
+                covariance=(1e-4, 0.0, 0.0, 1e-4, 0.0, 1e-4),
+                reason=reason,
+            ),
+            0.0,
+        )
+        assert health(inbox, False, 0.0).lost == reason
 
 
 def test_the_age_of_a_picture_is_told_by_its_stamp_however_often_it_is_repeated():

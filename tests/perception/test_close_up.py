@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 
+import msgspec
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -116,6 +117,22 @@ def test_the_node_before_the_cut_says_where_along_the_cane_it_belongs(scene: Sce
         shifts.append(float(np.subtract(there.position, here.position) @ cut.tangent))
     assert len(shifts) >= len(scene.cuts) / 2
     assert np.median(np.abs(shifts)) < 0.0015
+
+
+def test_in_a_picture_that_was_lifted_beforehand_the_last_kept_node_has_to_be_seen(scene: Scene) -> None:
+    """Canes tell where a picture belongs across them, not along."""
+    unseen = 0
+    for cut, view in scene.pairs():
+        # As if no node were 20 mm before the cut.
+        seen = msgspec.structs.replace(point(cut), offset=0.035)
+        level = check_close_up(view, SEES, seen, 7, PerceptionConfig())
+        lifted = check_close_up(view, SEES, seen, 7, PerceptionConfig(), lift=0.015)
+        if level.finding == "seen" and level.reason == reasons.node_before_cut_unseen():
+            unseen += 1
+            assert lifted.finding == "unseen" and lifted.reason == reasons.node_unseen_in_shifted_picture(15.0)
+        else:
+            assert lifted.finding == level.finding
+    assert unseen >= 2
 
 
 @pytest.mark.parametrize("turn", [(0.0, 0.045, 0.0), (0.045, 0.0, 0.0)])

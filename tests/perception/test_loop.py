@@ -2,9 +2,11 @@ import threading
 import time
 from types import SimpleNamespace
 
+import msgspec
 import pytest
 
 from perception.config import PerceptionConfig
+from perception.localisation.row_frame import RowFrame
 from perception.loop import PerceptionProcess, Worker
 from perception.segmentation.frame import CorruptFrameError
 from rolling_panda import messages as m
@@ -14,7 +16,18 @@ from rolling_panda.errors import RollingPandaError
 from rolling_panda.messages.perception import CameraState, Capsule, CloseUpResult, SpurDrawing, SpurPicture
 from rolling_panda.messages.robot import CameraFrame, Intrinsics
 from rolling_panda.reasons import severity_of
-from rolling_panda.topics import CAMERA, CAMERA_STATE, CLOSE_UP, EVENT, HEARTBEAT, OBSTACLES, PICTURES, PLANT, POINTS
+from rolling_panda.topics import (
+    CAMERA,
+    CAMERA_STATE,
+    CLOSE_UP,
+    EVENT,
+    HEARTBEAT,
+    LOCALISATION,
+    OBSTACLES,
+    PICTURES,
+    PLANT,
+    POINTS,
+)
 from rolling_panda.transport.runner import Runner
 from tests.support.fake_wire import FakeWire
 from tests.support.points import point
@@ -59,6 +72,7 @@ class FakePerception:
     def __init__(self):
         self.release, self.noted, self.newest, self.processed = threading.Event(), [], None, 0
         self.camera = SimpleNamespace(state=CameraState(header=m.Header()))
+        self.localisation = RowFrame(True).message(0.0)
         self.camera_rays = SimpleNamespace(add=lambda frame: self.noted.append(frame.header.frame_id))
 
     def answer(self, request):
@@ -137,6 +151,25 @@ def test_the_camera_is_told_when_it_changes_and_a_warning_of_each_kind_is_logged
     kinds = (old.code, turned.code)
     assert [event.reason for event in events if event.reason.code in kinds] == [old, turned]
     assert len({state.header.stamp for state in told}) == 4, "another stamp alone is no news"
+
+
+def test_the_place_in_the_row_is_told_once_a_second_and_at_once_when_the_robot_is_lost(parts):
+    wire, perception, loop = parts
+    told, events = wire.sent[LOCALISATION.name], wire.sent[EVENT.name]
+    loop.see("frame", 0.0)
+    step_until(loop, lambda: told)
+    for tick in range(1, 22):
+        loop.step(tick / 20.0)
+    assert len(told) == 2 and told[-1].state == "odometry"
+    lost = reasons.lost_in_row(reasons.lost_among_others())
+    perception.localisation = msgspec.structs.replace(perception.localisation, state="lost", reason=lost)
+    for second in (1.06, 1.12):
+        loop.see(str(second), second)
+        count = perception.processed + 1
+        step_until(loop, lambda count=count: perception.processed == count, second)
+        step_until(loop, lambda: told[-1].reason == lost, second)
+    assert len(told) == 3
+    assert [event.reason for event in events].count(lost) == 1
 
 
 def test_what_was_left_out_is_told_when_it_changes_and_at_most_once_a_minute(parts):

@@ -55,7 +55,8 @@ class PerceptionInTime:
                 self._made.append((now + _LOOK_S, self._perception.check_close_up(frame.message)))
             points = self._perception.process(frame.message)
             obstacles = Obstacles(header=points.header, capsules=self._perception.obstacles)
-            self._made += ((now + _PERCEPTION_S, points), (now + _PERCEPTION_S, obstacles))
+            for message in (points, obstacles, self._perception.localisation):
+                self._made.append((now + _PERCEPTION_S, message))
         self._beats += 1
         out: list[object] = [m.Heartbeat(process="perception", sequence=self._beats)]
         out += [message for due, message in self._made if now >= due]
