@@ -79,6 +79,7 @@ class SkeletonConfig(Struct, frozen=True, forbid_unknown_fields=True):
         min_depth: Smallest valid depth (m).
         max_depth: Wood beyond this depth belongs to another row (m).
         depth_step: Depth step between neighbouring pixels of different canes (m).
+        depth_reach: Depth that the camera lost is interpolated so far from a pixel that has it, along the wood (m).
         min_fragment_pixels: Shorter skeleton fragments are dropped (px).
         max_gap: Longest hidden gap between two fragments of one cane (m).
         max_bend: Largest change of direction over such a gap (rad).
@@ -96,6 +97,7 @@ class SkeletonConfig(Struct, frozen=True, forbid_unknown_fields=True):
     min_depth: Positive = 0.15
     max_depth: Positive = 1.6
     depth_step: Positive = 0.012
+    depth_reach: Positive = 0.02
     min_fragment_pixels: Annotated[int, Meta(ge=2, le=100)] = 4
     max_gap: Positive = 0.06
     max_bend: Positive = 0.5

@@ -1,16 +1,23 @@
-"""Depth inpainting on thin wood: a pixel whose depth differs from its neighbours' gets their median.
+"""Depth inpainting on thin wood.
 
 Along the edge of a cane a stereo camera gives the depth of the background, a mixture, or nothing. Uncorrected, a cane
-five pixels wide would lose its width, and scattered points would bend its axis.
+five pixels wide would lose its width, and scattered points would bend its axis: a pixel whose depth differs from its
+neighbours' gets their median. In the sun thin wood has no depth in patches, which would cut a cane into pieces: there
+the depth is interpolated along the wood.
 """
 
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse import csgraph, linalg
 
-from perception.arrays import Labels
+from perception.arrays import Index, Labels, neighbours
 from perception.config import SkeletonConfig
 from perception.segmentation.frame import CANE, NODE, SPUR, View, class_pixels
+
+Floats = NDArray[np.float32]
 
 #: Number of neighbours, of eight, that must have the depth of a valid pixel.
 _MIN_SUPPORT = 3
@@ -18,18 +25,33 @@ _MIN_SUPPORT = 3
 _HALF_WINDOW = 2
 
 
-def inpaint_depth(view: View, labels: Labels, config: SkeletonConfig) -> View:
-    """The frame with corrected depth of canes, nodes and spurs; 0 where no valid neighbour is in the window.
+def inpaint_depth(view: View, labels: Labels, config: SkeletonConfig, lost: bool = True) -> View:
+    """The frame with corrected depth of canes, nodes and spurs; 0 where none is known near enough.
 
     Args:
         view: The frame.
         labels: H×W class indices.
-        config: Depth range and depth step.
+        config: Depth range, depth step and reach.
+        lost: Whether depth that the camera lost is interpolated along the wood.
     """
     rows, cols = class_pixels(labels, (CANE, NODE, SPUR))
-    height, width = labels.shape
-    own = view.depth[rows, cols]
-    own = np.where((own > config.min_depth) & (own < config.max_depth), own, np.float32(0.0))
+    raw = view.depth[rows, cols]
+    own = np.where((raw > config.min_depth) & (raw < config.max_depth), raw, np.float32(0.0))
+    own = _smooth_outliers(own, rows, cols, labels.shape, config)
+    if lost and (own > 0.0).any():
+        reach = config.depth_reach * view.intrinsics.fx / float(np.median(own[own > 0.0]))
+        pairs = neighbours(labels.shape, rows, cols)
+        # What is seen beyond the range is another row, and has lost nothing.
+        pairs = pairs[(raw < config.max_depth)[pairs].all(axis=1)]
+        own = _interpolate_lost(own, pairs, reach)
+    out = view.depth.copy()
+    out[rows, cols] = own
+    return replace(view, depth=out)
+
+
+def _smooth_outliers(own: Floats, rows: Index, cols: Index, shape: tuple[int, ...], config: SkeletonConfig) -> Floats:
+    """Depth of the pixels (N, m; 0 = unknown), where it differs from the neighbours' the median of the window."""
+    height, width = shape
     # Flattened with an empty border, so that every neighbour is at a constant offset.
     stride = width + 2 * _HALF_WINDOW
     depth = np.zeros((height + 2 * _HALF_WINDOW) * stride, np.float32)
@@ -48,6 +70,38 @@ def inpaint_depth(view: View, labels: Labels, config: SkeletonConfig) -> View:
     count = np.count_nonzero(found, axis=1)
     # Zeros are sorted first: the lower median of the rest.
     middle = np.minimum(found.shape[1] - count + (count - 1) // 2, found.shape[1] - 1)
-    out = view.depth.copy()
-    out[rows[bad], cols[bad]] = np.where(count > 0, found[np.arange(len(found)), middle], np.float32(0.0))
-    return replace(view, depth=out)
+    out = own.copy()
+    out[bad] = np.where(count > 0, found[np.arange(len(found)), middle], np.float32(0.0))
+    return out
+
+
+def _interpolate_lost(own: Floats, pairs: Index, reach: float) -> Floats:
+    """Depth of the pixels (N, m), where it is unknown the mean of the neighbours' (Laplace's equation on the wood).
+
+    A cane is a strip in the image: along it that is linear interpolation, and at an end the last depth stays.
+
+    Args:
+        own: Depth; 0 = unknown.
+        pairs: Neighbouring pixels, P×2.
+        reach: Largest distance of an unknown pixel from a known one along the wood (px); farther ones stay unknown.
+    """
+    known, n = own > 0.0, len(own)
+    graph = sparse.coo_matrix((np.ones(len(pairs)), pairs.T), (n, n)).tocsr()
+    away = csgraph.dijkstra(
+        graph, directed=False, indices=np.flatnonzero(known), unweighted=True, min_only=True, limit=reach
+    )
+    lost = np.isfinite(away) & ~known
+    size = int(lost.sum())
+    if not size:
+        return own
+    number = np.cumsum(lost) - 1
+    here, beside = np.concatenate([pairs, pairs[:, ::-1]]).T
+    counts = lost[here] & (lost[beside] | known[beside])
+    here, beside = number[here[counts]], beside[counts]
+    inner = lost[beside]
+    edges = sparse.coo_matrix((np.ones(int(inner.sum())), (here[inner], number[beside[inner]])), (size, size))
+    laplacian = sparse.diags(np.bincount(here, minlength=size).astype(float)) - edges
+    border = np.bincount(here[~inner], own[beside[~inner]], minlength=size)
+    out = own.copy()
+    out[lost] = linalg.spsolve(laplacian.tocsc(), border)
+    return out

@@ -12,12 +12,10 @@ from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 from skimage.morphology import skeletonize
 
-from perception.arrays import Array, Index, Labels, Mask
+from perception.arrays import Array, Index, Labels, Mask, neighbours
 from perception.config import SkeletonConfig
 from perception.segmentation.frame import CANE, NODE, View, class_pixels
 
-#: Half of the eight neighbours: each pair of pixels once.
-_HALF_NEIGHBOURS = ((0, 1), (1, 0), (1, 1), (1, -1))
 #: Neighbours of a skeleton pixel that make it a fork.
 _FORK = 3
 #: Skeleton pixels averaged into one point of a fragment.
@@ -74,7 +72,7 @@ def find_cane_pixels(view: View, labels: Labels, config: SkeletonConfig) -> Cane
     near = view.depth[rows, cols]
     valid = (near > config.min_depth) & (near < config.max_depth)
     rows, cols, depth = rows[valid], cols[valid], near[valid].astype(float)
-    touching = _neighbours(labels.shape, rows, cols)
+    touching = neighbours(labels.shape, rows, cols)
     return CanePixels(
         labels.shape,
         rows,
@@ -171,7 +169,7 @@ def _paths(shape: tuple[int, ...], rows: Index, cols: Index) -> tuple[Index, Ind
 
     A closed loop starts at one of its pixels and is ordered in both directions.
     """
-    pairs = _neighbours(shape, rows, cols)
+    pairs = neighbours(shape, rows, cols)
     size = len(rows)
     graph = sparse.coo_matrix((np.ones(len(pairs), dtype=bool), (pairs[:, 0], pairs[:, 1])), (size, size))
     count, owner = csgraph.connected_components(graph, directed=False)
@@ -193,21 +191,6 @@ def _components(pairs: Index, depth: Array, step: float) -> Index:
     graph = sparse.coo_matrix((np.ones(len(joined)), (joined[:, 0], joined[:, 1])), (len(depth), len(depth)))
     _, labels = csgraph.connected_components(graph, directed=False)
     return np.asarray(labels, dtype=np.intp)
-
-
-def _neighbours(shape: tuple[int, ...], rows: Index, cols: Index) -> Index:
-    """Pairs of neighbouring pixels, as indices, P×2."""
-    height, width = shape
-    stride = width + 2
-    number = np.full((height + 1) * stride, -1, dtype=np.int32)
-    at = rows * stride + cols + 1
-    number[at] = np.arange(len(rows))
-    out = []
-    for dr, dc in _HALF_NEIGHBOURS:
-        beside = number[at + dr * stride + dc]
-        here = np.flatnonzero(beside >= 0)
-        out.append(np.stack([here, beside[here].astype(np.intp)], axis=1))
-    return np.concatenate(out)
 
 
 def _layers(pixels: CanePixels) -> Index:

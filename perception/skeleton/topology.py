@@ -38,8 +38,11 @@ def perceive_plant(view: View, labels: Labels, config: SkeletonConfig) -> Plant:
 
 
 def trace_canes(view: View, labels: Labels, config: SkeletonConfig) -> list[Centreline]:
-    """Centre lines of the canes of one frame, not yet rooted; arguments as of `perceive_plant`."""
-    return _trace(inpaint_depth(view, labels, config), labels, config)
+    """Centre lines of the canes of one frame, not yet rooted; arguments as of `perceive_plant`.
+
+    They are only where the camera has depth: a close-up decides on what it has seen.
+    """
+    return _trace(inpaint_depth(view, labels, config, lost=False), labels, config)
 
 
 def _trace(view: View, labels: Labels, config: SkeletonConfig) -> list[Centreline]:
