@@ -25,33 +25,18 @@ _MIN_SUPPORT = 3
 _HALF_WINDOW = 2
 
 
-def inpaint_depth(view: View, labels: Labels, config: SkeletonConfig, lost: bool = True) -> View:
-    """The frame with corrected depth of canes, nodes and spurs; 0 where none is known near enough.
+def inpaint_depth(view: View, labels: Labels, config: SkeletonConfig) -> View:
+    """The frame with corrected depth of canes, nodes and spurs; 0 where no valid neighbour is in the window.
 
     Args:
         view: The frame.
         labels: H×W class indices.
-        config: Depth range, depth step and reach.
-        lost: Whether depth that the camera lost is interpolated along the wood.
+        config: Depth range and depth step.
     """
     rows, cols = class_pixels(labels, (CANE, NODE, SPUR))
+    height, width = labels.shape
     raw = view.depth[rows, cols]
     own = np.where((raw > config.min_depth) & (raw < config.max_depth), raw, np.float32(0.0))
-    own = _smooth_outliers(own, rows, cols, labels.shape, config)
-    if lost and (own > 0.0).any():
-        reach = config.depth_reach * view.intrinsics.fx / float(np.median(own[own > 0.0]))
-        pairs = neighbours(labels.shape, rows, cols)
-        # What is seen beyond the range is another row, and has lost nothing.
-        pairs = pairs[(raw < config.max_depth)[pairs].all(axis=1)]
-        own = _interpolate_lost(own, pairs, reach)
-    out = view.depth.copy()
-    out[rows, cols] = own
-    return replace(view, depth=out)
-
-
-def _smooth_outliers(own: Floats, rows: Index, cols: Index, shape: tuple[int, ...], config: SkeletonConfig) -> Floats:
-    """Depth of the pixels (N, m; 0 = unknown), where it differs from the neighbours' the median of the window."""
-    height, width = shape
     # Flattened with an empty border, so that every neighbour is at a constant offset.
     stride = width + 2 * _HALF_WINDOW
     depth = np.zeros((height + 2 * _HALF_WINDOW) * stride, np.float32)
@@ -70,13 +55,35 @@ def _smooth_outliers(own: Floats, rows: Index, cols: Index, shape: tuple[int, ..
     count = np.count_nonzero(found, axis=1)
     # Zeros are sorted first: the lower median of the rest.
     middle = np.minimum(found.shape[1] - count + (count - 1) // 2, found.shape[1] - 1)
-    out = own.copy()
-    out[bad] = np.where(count > 0, found[np.arange(len(found)), middle], np.float32(0.0))
-    return out
+    # What is seen beyond the range is another row, and has lost nothing.
+    instead = np.where(raw[bad] >= config.max_depth, raw[bad], np.float32(0.0))
+    out = view.depth.copy()
+    out[rows[bad], cols[bad]] = np.where(count > 0, found[np.arange(len(found)), middle], instead)
+    return replace(view, depth=out)
 
 
-def _interpolate_lost(own: Floats, pairs: Index, reach: float) -> Floats:
-    """Depth of the pixels (N, m), where it is unknown the mean of the neighbours' (Laplace's equation on the wood).
+def interpolate_lost_depth(view: View, labels: Labels, config: SkeletonConfig) -> View:
+    """The frame with depth of canes, nodes and spurs also where the camera lost it, near to where it has it.
+
+    Args:
+        view: The frame, of `inpaint_depth`.
+        labels: H×W class indices.
+        config: Depth range and reach.
+    """
+    rows, cols = class_pixels(labels, (CANE, NODE, SPUR))
+    before = view.depth[rows, cols] < config.max_depth
+    rows, cols = rows[before], cols[before]
+    own = view.depth[rows, cols]
+    if not (own > 0.0).any():
+        return view
+    reach = config.depth_reach * view.intrinsics.fx / float(np.median(own[own > 0.0]))
+    out = view.depth.copy()
+    out[rows, cols] = _interpolated(own, neighbours(labels.shape, rows, cols), reach)
+    return replace(view, depth=out)
+
+
+def _interpolated(own: Floats, pairs: Index, reach: float) -> Floats:
+    """Depth of the pixels (N, m); an unknown one is the mean of its neighbours' (Laplace's equation on the wood).
 
     A cane is a strip in the image: along it that is linear interpolation, and at an end the last depth stays.
 

@@ -41,7 +41,7 @@ class Centreline:
         width_arc: Arc lengths of width measurements (K, m).
         width: Diameter there (K, m).
         nodes: By arc length.
-        hidden: Occluded stretches.
+        hidden: Stretches that are occluded, or have no measured depth.
         ends: Why it ends at its first and at its last point.
     """
 
@@ -124,7 +124,7 @@ def _measure(view: View, pixels: CanePixels, cane: Mask, chain: _Chain, config: 
         width_arc=width_arc,
         width=width,
         nodes=_nodes(pixels, members, along, config),
-        hidden=_hidden(along, float(stations[-1])),
+        hidden=_hidden(along[pixels.measured[members]], float(stations[-1])),
         ends=_ends(view, cane, axis),
     )
 
@@ -264,7 +264,7 @@ def _nodes(pixels: CanePixels, members: Index, along: Array, config: SkeletonCon
 
 
 def _hidden(along: Array, length: float) -> tuple[Span, ...]:
-    """Stretches without a pixel."""
+    """Stretches without a pixel of measured depth: where depth is interpolated, a node may be missed as well."""
     seen = np.sort(np.concatenate([[0.0], along[(along > 0.0) & (along < length)], [length]]))
     gaps = np.nonzero(np.diff(seen) > _MIN_HIDDEN)[0]
     return tuple(Span(float(seen[g]), float(seen[g + 1])) for g in gaps)

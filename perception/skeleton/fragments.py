@@ -38,6 +38,7 @@ class CanePixels:
         depth: Valid depth (N, m).
         points: Surface points, N×3 in odom (m).
         node: Whether the class is node (N).
+        measured: Whether the camera has depth there (N).
         component: Connected component without a depth step (N).
         touching: Pairs of neighbours in the image, P×2.
     """
@@ -48,6 +49,7 @@ class CanePixels:
     depth: Array
     points: Array
     node: Mask
+    measured: Mask
     component: Index
     touching: Index
 
@@ -66,8 +68,15 @@ class Fragment:
     pixels: int
 
 
-def find_cane_pixels(view: View, labels: Labels, config: SkeletonConfig) -> CanePixels:
-    """Cane and node pixels within the depth range, with their connected components."""
+def find_cane_pixels(view: View, labels: Labels, measured: Mask, config: SkeletonConfig) -> CanePixels:
+    """Cane and node pixels within the depth range, with their connected components.
+
+    Args:
+        view: The frame, with corrected depth.
+        labels: H×W class indices.
+        measured: Where the camera has depth, H×W.
+        config: Depth range and depth step.
+    """
     rows, cols = class_pixels(labels, (CANE, NODE))
     near = view.depth[rows, cols]
     valid = (near > config.min_depth) & (near < config.max_depth)
@@ -80,6 +89,7 @@ def find_cane_pixels(view: View, labels: Labels, config: SkeletonConfig) -> Cane
         depth,
         view.points(rows, cols, depth),
         labels[rows, cols] == NODE,
+        measured[rows, cols],
         _components(touching, depth, config.depth_step),
         touching,
     )

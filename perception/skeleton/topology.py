@@ -4,10 +4,10 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from perception.arrays import Array, Index, Labels, distance
+from perception.arrays import Array, Index, Labels, Mask, distance
 from perception.config import SkeletonConfig
 from perception.plant.model import SURFACE_OFFSET, Cane, Node, Plant, Span, Spur
-from perception.segmentation.depth_inpainting import inpaint_depth
+from perception.segmentation.depth_inpainting import inpaint_depth, interpolate_lost_depth
 from perception.segmentation.frame import CORDON, OLD_CUT, SPUR, TRUNK, View, class_pixels
 from perception.skeleton.centreline import Centreline, base_radius, centrelines
 from perception.skeleton.fragments import find_cane_pixels, find_fragments
@@ -33,8 +33,9 @@ def perceive_plant(view: View, labels: Labels, config: SkeletonConfig) -> Plant:
         labels: H×W class indices.
         config: Skeleton and topology.
     """
-    view = inpaint_depth(view, labels, config)
-    return _root_canes(view, labels, _trace(view, labels, config), config)
+    mended = inpaint_depth(view, labels, config)
+    whole = interpolate_lost_depth(mended, labels, config)
+    return _root_canes(whole, labels, _trace(whole, labels, mended.depth > 0.0, config), config)
 
 
 def trace_canes(view: View, labels: Labels, config: SkeletonConfig) -> list[Centreline]:
@@ -42,11 +43,12 @@ def trace_canes(view: View, labels: Labels, config: SkeletonConfig) -> list[Cent
 
     They are only where the camera has depth: a close-up decides on what it has seen.
     """
-    return _trace(inpaint_depth(view, labels, config, lost=False), labels, config)
+    mended = inpaint_depth(view, labels, config)
+    return _trace(mended, labels, mended.depth > 0.0, config)
 
 
-def _trace(view: View, labels: Labels, config: SkeletonConfig) -> list[Centreline]:
-    pixels = find_cane_pixels(view, labels, config)
+def _trace(view: View, labels: Labels, measured: Mask, config: SkeletonConfig) -> list[Centreline]:
+    pixels = find_cane_pixels(view, labels, measured, config)
     chains = link_fragments(view, find_fragments(pixels, config), pixels.mask(), config)
     return centrelines(view, pixels, chains, config)
 

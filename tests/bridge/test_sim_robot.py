@@ -1,3 +1,4 @@
+import math
 from pathlib import Path
 
 import msgspec
@@ -147,3 +148,28 @@ def test_torque_stays_in_its_bound() -> None:
     servos = VelocityServos(np.array([0.02, 0.02]), np.array([12.0, 5.0]), 0.001)
     for _ in range(100):
         assert np.all(np.abs(servos.step(np.array([1e3, -1e3]), np.zeros(2), np.eye(2))) <= [12.0, 5.0])
+
+
+@pytest.mark.parametrize(("hold_s", "gives_way"), [(math.inf, 0.05), (0.2, 0.0)])
+def test_a_joint_that_holds_takes_up_a_lasting_load_and_one_that_does_not_gives_way(
+    hold_s: float, gives_way: float
+) -> None:
+    servos, inertia, load, dt = (
+        VelocityServos(np.array([0.02]), np.array([12.0]), 0.001, np.array([hold_s])),
+        0.1,
+        0.5,
+        0.001,
+    )
+    speed = np.zeros(1)
+    for _ in range(2000):
+        speed = speed + (servos.step(np.zeros(1), speed, np.array([[inertia]])) - load) / inertia * dt
+    assert float(speed[0]) == pytest.approx(-gives_way, abs=0.002)
+
+
+def test_a_joint_that_holds_follows_a_step_nearly_as_one_that_does_not() -> None:
+    servos = VelocityServos(np.array([0.02]), np.array([87.0]), 0.001, np.array([0.2]))
+    speed, trail = np.zeros(1), []
+    for _ in range(1000):
+        speed = speed + servos.step(np.ones(1), speed, np.eye(1)) * 0.001
+        trail.append(float(speed[0]))
+    assert max(trail) < 1.06 and abs(trail[-1] - 1.0) < 0.005

@@ -52,24 +52,24 @@ _TORQUE = np.array([60.0, 60.0, 87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0])
 
 #: Time constant of the loop that makes a joint follow the lagged setpoint (s): well above a step of 1 ms.
 LOOP_S = 0.010
-#: Time in which a joint that holds takes up a lasting load (s).
-_HOLD_S = 0.05
+#: Time in which wheels and arm take up a lasting load (s).
+_WHEEL_HOLD_S, _ARM_HOLD_S = 0.05, 0.2
 
 
 class VelocityServos:
     """First-order lag on the setpoint, then a velocity loop with bounded torque."""
 
-    def __init__(self, lag_s: Array, torque: Array, dt: float, holds: Array | None = None) -> None:
+    def __init__(self, lag_s: Array, torque: Array, dt: float, hold_s: Array | None = None) -> None:
         """At rest.
 
         Args:
             lag_s: Time constant from setpoint to speed (n, s), of which `LOOP_S` is the loop itself.
             torque: Bound (n, N·m), on top of what compensates gravity.
             dt: Step (s).
-            holds: Which joints hold against a lasting load, such as a slope, without a difference in speed (n of 0 and
-                1); None for none.
+            hold_s: Time in which a joint takes up a lasting load, such as a slope, without a difference in speed
+                (n, s); infinite for one that gives way to it; None for none that does not.
         """
-        self._hold = np.zeros_like(lag_s) if holds is None else holds * dt / _HOLD_S
+        self._hold = np.zeros_like(lag_s) if hold_s is None else dt / hold_s
         self._held = np.zeros_like(lag_s)
         self._blend = np.array([1.0 - math.exp(-dt / max(lag - LOOP_S, dt / 10)) for lag in lag_s])
         self._torque = torque
@@ -275,9 +275,10 @@ class SimulatedRobot:
     def _make_servos(self) -> VelocityServos:
         config = self._config
         lag = np.array([config.wheel_lag_s] * 2 + [config.arm_lag_s] * len(self._plant.arm_v))
-        gravity_leans = self._plant.model.opt.gravity[0] != 0.0
-        holds = np.array([1.0] * 2 + [0.0] * len(self._plant.arm_v)) if self._plant.ground or gravity_leans else None
-        return VelocityServos(lag, _TORQUE, STEP_S, holds)
+        # In the calm world nothing loads them: a slope the wheels, or a cane that pushes back the arm.
+        slopes = bool(self._plant.ground) or self._plant.model.opt.gravity[0] != 0.0
+        wheels, arm = _WHEEL_HOLD_S if slopes else math.inf, _ARM_HOLD_S if self._canes is not None else math.inf
+        return VelocityServos(lag, _TORQUE, STEP_S, np.array([wheels] * 2 + [arm] * len(self._plant.arm_v)))
 
     def _inertia(self) -> Array:
         """Inertia felt by the servos: that of the arm, and half of the robot for each wheel."""
