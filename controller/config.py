@@ -126,7 +126,7 @@ class MotionConfig(Struct, frozen=True, forbid_unknown_fields=True):
         tool_turn: Limit of the tool's angular speed (rad/s).
         tool_acceleration: Acceleration limit of planned tool motions (m/s²).
         tool_jerk: Jerk limit of planned tool motions (m/s³).
-        cut_speed: Speed limit in the last `slow_zone` before the cut (m/s).
+        cut_speed: Speed limit in the last `slow_zone` before the cut (m/s); usual is the slowest of the contact trials.
         slow_zone: Length of the slow last stretch (m). The blades enter the canes inside it.
         slow_braking: Deceleration of the tool to `cut_speed` (m/s²).
         blend: Fraction of the shorter of two segments that overlaps with the other, where the tool rounds the corner.
@@ -139,7 +139,7 @@ class MotionConfig(Struct, frozen=True, forbid_unknown_fields=True):
     tool_turn: Annotated[float, at_most(2.5)] = 1.5
     tool_acceleration: Annotated[float, at_most(10.0)] = 3.0
     tool_jerk: Annotated[float, at_most(500.0)] = 50.0
-    cut_speed: Annotated[float, at_most(0.1)] = 0.03
+    cut_speed: Annotated[float, at_most(0.1)] = 0.05
     slow_zone: Annotated[float, at_least(0.01, 0.2)] = 0.025
     slow_braking: Annotated[float, at_most(3.0)] = 1.2
     blend: Annotated[float, Meta(ge=0.0, le=0.5)] = 0.4

@@ -298,6 +298,12 @@ RELATIONS: Final = (
         "one frame of the resting camera may be lost",
         times=2,
     ),
+    Relation(
+        "bridge.camera_resting_hz",
+        "controller.supervision.picture_wait_s",
+        "a robot that stands waits for more than one frame of the resting camera",
+        times=2,
+    ),
 )
 
 
