@@ -38,8 +38,8 @@ from perception.segmentation.segmenter import SEGMENTERS, choose_segmenter
 from rolling_panda import messages as m
 from rolling_panda.model.robot import RobotModel
 
-#: Vines of a row, and the way between two frames (m): two a second at the survey's default speed of 0.15 m/s.
-ROW_VINES, STEP = 3, 0.075
+#: Vines of a row, and the way between two frames (m): two a second at the survey's default speed of 0.25 m/s.
+ROW_VINES, STEP = 3, 0.125
 #: Nodes that stay, by the kind of cut.
 KEPT = {"spur cut": 2, "cane cut": 8}
 #: The camera stands so far ahead of the base in the survey posture (m), and begins before the first trunk.

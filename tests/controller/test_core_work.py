@@ -96,7 +96,8 @@ def test_tool_goes_in_slowly_and_never_sweeps_through_the_canes():
             fastest_near = max(fastest_near, np.linalg.norm(after - before) / r.dt)
         assert r.now < 60
     assert deepest_away < 0.75 - 0.2
-    assert 0 < fastest_near < 0.033
+    # The base may still bring in some millimetres a second.
+    assert 0 < fastest_near < CONFIG.motion.cut_speed * 1.15
     assert entry(r, "a").state == entry(r, "b").state == "DONE"
 
 
