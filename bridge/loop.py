@@ -49,7 +49,7 @@ class BridgeProcess:
         for picture in inbox.drain(CloseUpRequest):
             core.on_picture(picture.message)
         while (request := inbox.next_request()) is not None:
-            out.append(Reply(request, core.on_release(request.message, self._time.now)))
+            out.append(Reply(request, core.answer(request.message, self._time.now)))
         for _ in range(due):
             out += core.step(self._time.tick(), now, inbox.wall_time).messages
         return out

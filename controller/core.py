@@ -48,7 +48,14 @@ from rolling_panda.bounds import wider
 from rolling_panda.commands import COMMAND_OF, Condition, Handlers
 from rolling_panda.config import RobotConfig
 from rolling_panda.errors import ControlError
-from rolling_panda.messages.perception import CALIBRATION, CHECK, CloseUpRequest, CloseUpResult, Obstacles
+from rolling_panda.messages.perception import (
+    CALIBRATION,
+    CHECK,
+    CloseUpRequest,
+    CloseUpResult,
+    Obstacles,
+    RobotCalibration,
+)
 from rolling_panda.messages.supervision import StopRecord
 from rolling_panda.transport.inbox import Answered, Inbox, Rejected, Reply, Request
 
@@ -100,6 +107,7 @@ class Controller:
         self._inbox = Inbox()
         self._points_seen: object = None
         self._state_due = -math.inf
+        self._calibration_due: m.UseCalibration | None = None
         self._relaxed_limits = (*wider("controller", config), *wider("robot", robot_config))
         for relaxed in self._relaxed_limits:
             self._event_log.log(reasons.limits_relaxed(relaxed))
@@ -172,7 +180,8 @@ class Controller:
         motion = self._movement.send(moved.xi, fencing.token, joints, self.mode == "ESTOP_LATCHED")
         token = None if joints is None else fencing.request(joints.message.sequence, self.mode, now)
         release = supervisor.stops.release_due()
-        due = (token, supervisor.stop_due, motion, cut, self._picture(now), release)
+        calibration, self._calibration_due = self._calibration_due, None
+        due = (token, supervisor.stop_due, motion, cut, self._picture(now), release, calibration)
         out: list[object] = [*replies, *(each for each in due if each is not None)]
         if now >= self._state_due:
             self._state_due = now + _STATE_S
@@ -211,7 +220,9 @@ class Controller:
         told = [reasons.message_rejected(each.topic, each.reason) for each in rejected]
         for answered in inbox.drain(Answered):
             if not answered.message.answer.ok:
-                told.append(reasons.release_refused(answered.message.answer.reason or reasons.unexplained()))
+                why = answered.message.answer.reason or reasons.unexplained()
+                used = isinstance(answered.message.request, m.UseCalibration)
+                told.append(reasons.calibration_refused(why) if used else reasons.release_refused(why))
         return [m.LogEvent(header=m.Header(now), process="controller", reason=reason) for reason in told]
 
     def answer(self, intent: intents.Intent, now: float) -> m.Answer:
@@ -255,6 +266,8 @@ class Controller:
             intents.LookAgain: self._look_again,
             intents.CalibrateCamera: functools.partial(self._look_around, CALIBRATION),
             intents.CheckCamera: functools.partial(self._look_around, CHECK),
+            intents.CalibrateBase: lambda asked, now: self._begin(asked, now, self._movement.sequence.drive_around),
+            intents.UseBase: self._use_base,
             intents.Pause: self._pause,
             intents.Home: self._home,
             intents.Reset: lambda asked, now: self._supervisor.stops.ask_release(asked, self._supervisor.bridge, now),
@@ -356,6 +369,15 @@ class Controller:
 
     def _look_around(self, prefix: str, asked: intents.Start, now: float) -> m.Reason | None:
         return self._begin(asked, now, functools.partial(self._movement.look_around, prefix))
+
+    def _use_base(self, asked: intents.UseBase, now: float) -> m.Reason | None:
+        """Have the bridge use the base's calibration that the operator saw; its log tells what becomes of it."""
+        found = self._inbox.newest(RobotCalibration)
+        base = None if found is None else found.message.base
+        if base is None or base.made_at != asked.made_at:
+            return reasons.no_base_offered()
+        self._calibration_due = m.UseCalibration(user=asked.user, base=base)
+        return None
 
     def _begin(self, asked: intents.Start, now: float, work: Callable[[], None]) -> m.Reason | None:
         refused = self._change_mode(asked, now)

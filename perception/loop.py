@@ -15,7 +15,14 @@ from perception.segmentation.frame import CorruptFrameError
 from rolling_panda import messages as m
 from rolling_panda import reasons, topics
 from rolling_panda.errors import RollingPandaError
-from rolling_panda.messages.perception import CameraState, CloseUpResult, Localisation, Obstacles, SpurPicture
+from rolling_panda.messages.perception import (
+    CameraState,
+    CloseUpResult,
+    Localisation,
+    Obstacles,
+    RobotCalibration,
+    SpurPicture,
+)
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.transport.inbox import Inbox, Received, Reply, Request
 from rolling_panda.transport.runner import Runner, Wire
@@ -90,6 +97,7 @@ class _Output:
     reply: Reply | None
     camera: CameraState
     localisation: Localisation
+    calibration: RobotCalibration
 
 
 class PerceptionProcess:
@@ -123,6 +131,8 @@ class PerceptionProcess:
         self._camera_told: CameraState | None = None
         self._localisation_sent = -1e9
         self._localisation_told: Localisation | None = None
+        self._calibration = perception.calibrator.state
+        self._calibration_told: RobotCalibration | None = None
         self._obstacles_sent = self._picture_sent = self._rejected_logged = -1e9
         self._started = False
         self._last_error = ""
@@ -169,6 +179,9 @@ class PerceptionProcess:
             self._picture_sent = now
         self._tell_camera(now)
         self._tell_localisation(now)
+        if self._calibration is not self._calibration_told:
+            self._calibration_told = self._calibration
+            self._out.append(self._calibration)
         self._beat(now)
         return self._out
 
@@ -183,6 +196,7 @@ class PerceptionProcess:
 
     def _accept(self, output: _Output, now: float) -> None:
         self._newest, self._last_error, self._camera = output, "", output.camera
+        self._calibration = output.calibration
         self._out.append(output.points)
         # The controller counts the age of what it has: a repetition a second later is too late on a busy machine.
         self._obstacles_sent = -math.inf
@@ -277,4 +291,5 @@ def _work(perception: Perception, job: CameraFrame | Request, send: Callable[[Cl
         reply,
         perception.camera.state,
         perception.localisation,
+        perception.calibrator.state,
     )

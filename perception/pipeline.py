@@ -10,6 +10,7 @@ from msgspec.structs import replace
 
 from perception.arrays import Array, Labels, distance
 from perception.calibration.camera import CameraCalibration, Keep, keep_nothing
+from perception.calibration.robot import RobotCalibrator
 from perception.config import PerceptionConfig, RuleConfig
 from perception.localisation.row_frame import RowFrame
 from perception.obstacles.cylinder_fit import Rejection
@@ -45,6 +46,7 @@ from rolling_panda.commands import (
     UseCamera,
 )
 from rolling_panda.messages.perception import (
+    BASE,
     CALIBRATION,
     CHECK,
     CameraMount,
@@ -116,6 +118,7 @@ class Perception:
         self.segmenter = segmenter
         self._model = model or RobotModel()
         self.camera = CameraCalibration(self._model, mount, keep)
+        self.calibrator = RobotCalibrator(self._model)
         self._tracker = Tracker(config.tracker)
         self._numbering = SpurNumbering(config.tracker.spur_separation, config.tracker.vine_spacing)
         self._frames = 0
@@ -166,7 +169,7 @@ class Perception:
         self.row_frame.predict(_base(frame), view.stamp)
         self.withdrawn = ()
         # The calibration's board hides the row.
-        if frame.point_id.startswith(CALIBRATION) or -view.R[2, 1] < self._config.min_upright:
+        if frame.point_id.startswith((CALIBRATION, BASE)) or -view.R[2, 1] < self._config.min_upright:
             return self.points()
         try:
             labels = self.segmenter.segment(view)
@@ -241,6 +244,8 @@ class Perception:
         """
         if frame.point_id.startswith(CALIBRATION):
             return self.camera.look(frame)
+        if frame.point_id.startswith(BASE):
+            return self.calibrator.look(frame)
         if frame.point_id.startswith(CHECK):
             # The picture itself tells, as one of a survey.
             return CloseUpResult(

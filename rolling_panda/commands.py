@@ -370,6 +370,20 @@ class CheckCamera(Start, frozen=True, kw_only=True):
     """READY → AUTO. Look at the row from a few places, to check the camera's calibration. The base stands still."""
 
 
+class CalibrateBase(Start, frozen=True, kw_only=True):
+    """READY → AUTO. Drive and turn before the calibration's board, to measure the wheels. It cuts nothing."""
+
+
+class UseBase(Intent, frozen=True, kw_only=True):
+    """Use the new calibration of the base's wheels from now on. It moves nothing.
+
+    Attributes:
+        made_at: `made_at` of the calibration that the operator saw.
+    """
+
+    made_at: WallTime
+
+
 class Pause(Intent, frozen=True, kw_only=True):
     """AUTO or TELEOP → PAUSED."""
 
@@ -569,6 +583,8 @@ COMMANDS: Final[tuple[Command, ...]] = (
     Command(LookAgain, "mode", "/look-again", control=True, event=Event.START, conditions=_WATCHED_MOTION),
     Command(CalibrateCamera, "mode", "/camera/calibrate", control=True, event=Event.START, conditions=_WATCHED_MOTION),
     Command(CheckCamera, "mode", "/camera/check", control=True, event=Event.START, conditions=_WATCHED_MOTION),
+    Command(CalibrateBase, "mode", "/base/calibrate", control=True, event=Event.START, conditions=_WATCHED_MOTION),
+    Command(UseBase, "mode", "/base/use", modes=("IDLE", "READY", "PAUSED")),
     Command(Pause, "mode", "/pause", event=Event.PAUSE),
     Command(Resume, "mode", "/resume", control=True, event=Event.RESUME),
     Command(

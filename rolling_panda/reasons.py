@@ -2512,6 +2512,71 @@ def withdrawn_for_calibration(point: str) -> None:
     """{point} was withdrawn, as the camera has a new calibration."""
 
 
+@_reason("warning", "see that the board is in the picture from everywhere, and calibrate again")
+def base_few_views(seen: float, needed: float) -> None:
+    """The board was seen from {seen:.0f} places of the base; it takes {needed:.0f}."""
+
+
+@_reason("warning", "calibrate again")
+def base_clock_jumped(gap: float) -> None:
+    """The robot's clock has jumped: {gap:.1f} s lie between two pictures of the board."""
+
+
+@_reason("warning", "give the base room to drive and to turn, and calibrate again")
+def base_moved_little(way: float, turn: float, least_way: float, least_turn: float) -> None:
+    """The base moved by {way:.0f} mm and {turn:.0f}°; it takes {least_way:.0f} mm and {least_turn:.0f}°."""
+
+
+@_reason("warning", "calibrate on firm, even ground, with a board that stands still")
+def base_slipped(slip: float, most: float) -> None:
+    """The wheels slipped, or the board moved: by {slip:.1f} % of the way; allowed: {most:g} %."""
+
+
+@_reason("warning", "see that the board is of the right size and stands still, and calibrate again")
+def base_implausible(radius: float, track: float, most: float) -> None:
+    """By the board the wheels are {radius:.1f} % larger, {track:.1f} % wider apart: over {most:g} % off the drawing."""
+
+
+@_reason("warning", "calibrate on firm ground, with light on the board")
+def base_unsure(radius: float, track: float, most: float) -> None:
+    """The wheels' radius is uncertain by {radius:.2f} % and their track by {track:.2f} %; allowed: {most:g} %."""
+
+
+@_reason("warning", "free the base, and calibrate again")
+def base_blocked(cause: str) -> None:
+    """The calibration was stopped: the base is held by {cause}."""
+
+
+@_reason("info", "calibrate the base first")
+def no_base_offered() -> None:
+    """There is no new calibration of the base to use."""
+
+
+@_reason("warning", "let the robot come to rest, and use it again")
+def calibration_in_motion() -> None:
+    """A calibration is taken into use at rest only."""
+
+
+@_reason("warning", "calibrate again")
+def calibration_of_other_wheels(most: float) -> None:
+    """The calibration differs from the wheels as drawn by more than {most:g} %, and is not used."""
+
+
+@_reason("info", "")
+def calibration_under_way() -> None:
+    """A calibration is being written already."""
+
+
+@_reason("warning", "")
+def calibration_refused(cause: Reason) -> None:
+    """The calibration was not taken into use: {cause}."""
+
+
+@_reason("info", "")
+def base_calibration_used(radius: float, track: float) -> None:
+    """The base's new calibration is in use: its wheels are {radius:.2f} % larger, {track:.2f} % wider apart."""
+
+
 @_reason("warning", "cuts may miss")
 def camera_looks_left(angle: float, sd: float) -> None:
     """The camera looks {angle:.1f}° (± {sd:.1f}°) to the left of where it was calibrated."""

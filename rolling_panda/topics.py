@@ -200,6 +200,10 @@ LOCALISATION = Topic(
     "perception/localisation", perception.Localisation, "perception", "controller", 1, "DATA_LOW", "DROP",
     "odom in map with its covariance, and whether the robot is lost; also at once on change", latched=True,
 )
+ROBOT_CALIBRATION = Topic(
+    "perception/calibration", perception.RobotCalibration, "perception", "controller, server", 0.5, "DATA_LOW", "DROP",
+    "what pictures of the board tell of the base; also at once on change", latched=True,
+)
 SCENERY = Topic(
     "scenery", perception.Scenery, "bridge", "server", 0.5, "BACKGROUND", "DROP",
     "the simulated row; for display only", latched=True,
@@ -212,8 +216,7 @@ REPLAY = Topic(
 TOPICS: tuple[Topic[Any], ...] = (
     MOTION, TOKEN, CUT, CLOSE_UP_REQUEST, STOP, TELEOP, JOINTS, ODOMETRY, BRIDGE, CONTROLLER, PLAN, REPORT, TIMELINE,
     PROGRAM, HEARTBEAT, EVENT, CAMERA, PREVIEW, PREVIEW_MOTION, POINTS, PICTURES, CLOSE_UP, OBSTACLES, CAMERA_STATE,
-    LOCALISATION,
-    SCENERY, PRESENCE, CONTROL, STOPS, HARDWARE_STOP, REPLAY,
+    LOCALISATION, ROBOT_CALIBRATION, SCENERY, PRESENCE, CONTROL, STOPS, HARDWARE_STOP, REPLAY,
 )
 #: The topic of each type of message.
 TOPIC_OF: dict[type[Any], Topic[Any]] = {topic.message: topic for topic in TOPICS}
@@ -234,10 +237,13 @@ PLANT: Service[commands.PlantRequest] = Service(
     ),
     "perception", 2.0, "pruning rules, points by hand, places that are left, and the calibration of the camera",
 )
+CALIBRATION: Service[m.UseCalibration] = Service(
+    "service/calibration", (m.UseCalibration,), "bridge", 0.5, "use a calibration of the robot",
+)
 SEEK: Service[commands.SeekReplay] = Service(
     "service/seek", (commands.SeekReplay,), "controller", 1.0, "jump in, play or pause the recording, or set its speed",
 )
-SERVICES: tuple[Service[Any], ...] = (INTENT, RELEASE, PLANT, SEEK)
+SERVICES: tuple[Service[Any], ...] = (INTENT, RELEASE, PLANT, CALIBRATION, SEEK)
 # fmt: on
 
 

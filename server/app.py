@@ -13,7 +13,7 @@ from starlette.types import ASGIApp, Scope
 
 from rolling_panda import __version__, reasons
 from rolling_panda.messages.page import Diagnostics, PageEvents, PagePoints, PageState
-from rolling_panda.messages.perception import CameraState, SpurDrawing
+from rolling_panda.messages.perception import CameraState, RobotCalibration, SpurDrawing
 from rolling_panda.messages.supervision import SessionPlan, SessionReport, Timeline
 from rolling_panda.messages.types import Reason
 from rolling_panda.resources import resource
@@ -43,7 +43,18 @@ _ABOUT = (
 
 #: Response types that are no Pydantic models.
 _MESSAGES = (
-    *(PageState, PagePoints, PageEvents, SessionPlan, SessionReport, CameraState, Previewed, Control, SpurDrawing),
+    *(
+        PageState,
+        PagePoints,
+        PageEvents,
+        SessionPlan,
+        SessionReport,
+        CameraState,
+        RobotCalibration,
+        Previewed,
+        Control,
+        SpurDrawing,
+    ),
     *(Diagnostics, Timeline),
 )
 

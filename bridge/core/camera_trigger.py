@@ -21,6 +21,7 @@ class Posture(NamedTuple):
     header: m.Header
     base: m.PlanarPose
     position: m.Actuated
+    wheels: tuple[float, float, float] | None = None
 
 
 class CameraTrigger:
@@ -87,4 +88,5 @@ class CameraTrigger:
             labels_zlib=picture.labels_zlib,
             point_id="" if wanted is None else wanted.point_id,
             number=0 if wanted is None else wanted.number,
+            wheels=posture.wheels,
         )

@@ -38,6 +38,11 @@ class Odometer:
         """Pose of the base from the wheels, without delay and noise."""
         return planar_pose(self._pose)
 
+    @property
+    def drive(self) -> DifferentialDrive:
+        """Geometry of the base, as drawn."""
+        return self._drive
+
     def follow(self, wheels: Array) -> None:
         """Integrate up to these wheel angles (2, rad); the first ones are the origin's."""
         if self._wheels is not None:

@@ -10,6 +10,7 @@ from msgspec.structs import replace
 
 from bridge.config import BridgeConfig
 from bridge.core.bridge import TICK_S, BridgeCore
+from bridge.core.calibration import Keep, WheelCalibration, forget
 from bridge.core.cut_orders import CutMemory
 from bridge.core.odometer import Odometer
 from bridge.core.state_memory import Remembered
@@ -23,6 +24,7 @@ from rolling_panda import reasons
 from rolling_panda.bounds import wider
 from rolling_panda.config import RobotConfig, TransportConfig, load_section
 from rolling_panda.errors import InputError
+from rolling_panda.messages.robot import BaseCalibration
 from rolling_panda.messages.types import BridgeKind
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.reasons import text_of
@@ -126,6 +128,8 @@ def real_bridge(
     cuts: CutMemory | None = None,
     memory: KeptValue[Remembered] | None = None,
     fakes: bool = False,
+    base: BaseCalibration | None = None,
+    keep_base: Keep = forget,
 ) -> BridgeCore:
     """Assemble a bridge with the real robot.
 
@@ -137,6 +141,8 @@ def real_bridge(
         cuts: Durable memory of cuts; None keeps them for the life of the process.
         memory: Other state that survives a restart; None keeps nothing.
         fakes: Whether the devices are `bridge.fakes`; the bridge reports it.
+        base: Calibration of the wheels; None takes them to be as drawn.
+        keep_base: Keeps a new one.
 
     Raises:
         ConfigError: A section is wrong.
@@ -160,7 +166,8 @@ def real_bridge(
     robot = RealRobot(devices.base, devices.arm, devices.blades, devices.camera, moving)
     odometer = Odometer(model.drive, config.odometry, TICK_S)
     kind: BridgeKind = "fakes" if fakes else "real"
-    return BridgeCore(robot, config, model.limits, odometer, kind, None, rejections, cuts, memory, told)
+    wheels = WheelCalibration(model.drive.sizes, float(model.limits.velocity[0]), base, keep_base)
+    return BridgeCore(robot, config, model.limits, odometer, kind, None, rejections, cuts, memory, told, wheels=wheels)
 
 
 def wait_for_states(devices: Devices, limit_s: float = _FIRST_STATE_S) -> None:

@@ -5,6 +5,7 @@ from typing import Literal
 
 from bridge.config import BridgeConfig
 from bridge.core.bridge import TICK_S, BridgeCore
+from bridge.core.calibration import Keep, WheelCalibration, forget
 from bridge.core.cut_orders import CutMemory
 from bridge.core.odometer import Odometer
 from bridge.core.state_memory import Remembered
@@ -17,6 +18,7 @@ from bridge.sim.vineyard.grow import grow
 from bridge.sim.world.config import load_world
 from rolling_panda.bounds import wider
 from rolling_panda.config import RobotConfig, load_section
+from rolling_panda.messages.robot import BaseCalibration
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.transport.rejections import Rejections
@@ -30,6 +32,8 @@ def simulated_bridge(
     rejections: Rejections | None = None,
     cuts: CutMemory | None = None,
     memory: KeptValue[Remembered] | None = None,
+    base: BaseCalibration | None = None,
+    keep_base: Keep = forget,
 ) -> BridgeCore:
     """Bridge core with the simulated robot beside a row grown from `seed`.
 
@@ -42,6 +46,8 @@ def simulated_bridge(
         rejections: Counters of refusals, shared with the transport.
         cuts: Cuts that survive a restart; None for this run only.
         memory: State that survives a restart; None for none.
+        base: Calibration of the wheels; None takes them to be as drawn.
+        keep_base: Keeps a new one.
 
     Raises:
         ConfigError: A section is wrong, or the trace cannot be written.
@@ -52,7 +58,20 @@ def simulated_bridge(
     odometer = Odometer(model.drive, config.odometry, TICK_S, seed)
     robot = simulated_robot(config_path, seed, trace, camera)
     widened = (*wider("bridge", config), *wider("robot", limits))
-    return BridgeCore(robot, config, model.limits, odometer, "sim", robot.scenery, rejections, cuts, memory, widened)
+    wheels = WheelCalibration(model.drive.sizes, float(model.limits.velocity[0]), base, keep_base)
+    return BridgeCore(
+        robot,
+        config,
+        model.limits,
+        odometer,
+        "sim",
+        robot.scenery,
+        rejections,
+        cuts,
+        memory,
+        widened,
+        wheels=wheels,
+    )
 
 
 def simulated_robot(

@@ -21,6 +21,7 @@ from controller.config import ControllerConfig, WorkConfig
 from controller.motion.follower import Follower, Measured, MotionTimeout, Tracking, missed
 from controller.motion.tool_motion import Leg, ToolMotion
 from controller.whole_body.saturation import Saturation
+from controller.work.base_views import BaseViews
 from controller.work.camera_views import CameraViews, Refusal
 from controller.work.close_up import CloseUpClient, PostCutCheck, camera_ready, not_as_accepted
 from controller.work.homing import Withdrawal
@@ -690,11 +691,11 @@ class Surveying(Stage):
 
 
 class Calibrating(Stage):
-    """Looking at the calibration's board, or at the row, from several places."""
+    """Looking at the calibration's board, or at the row, from several postures of the arm or places of the base."""
 
     phase: m.Phase = "CALIBRATION"
 
-    def __init__(self, parts: Parts, views: CameraViews) -> None:
+    def __init__(self, parts: Parts, views: CameraViews | BaseViews) -> None:
         """With one round of pictures."""
         super().__init__(parts)
         self._views = views
@@ -815,6 +816,12 @@ class CutSequence:
         parts.next_cut.forget()
         views = CameraViews(parts.config, parts.follower, parts.saturation, parts.close_ups, prefix, postures, refusal)
         self._stage = Calibrating(parts, views)
+
+    def drive_around(self) -> None:
+        """Start to drive and turn before the calibration's board."""
+        parts = self._parts
+        parts.next_cut.forget()
+        self._stage = Calibrating(parts, BaseViews(parts.config, parts.follower, parts.saturation, parts.close_ups))
 
     def finish_cut_and_pause(self, why: m.Reason | None) -> None:
         """With a reason: begin no further cut, leave the canes and pause. None continues the work."""

@@ -98,7 +98,7 @@ class Survey:
         turned = math.remainder(float(robot.q[2]) - self._config.work.row_heading, math.tau)
         turning = -_GAIN_HEADING * turned - _GAIN_ASIDE * speed * aside
         xi = np.zeros(NXI)
-        xi[:2] = _wheels(robot, speed, turning)
+        xi[:2] = wheels(robot, speed, turning)
         tracking: Tracking = self._follower.jog(xi, robot)
         if self._moved is None or abs(x - self._moved[0]) > _LEAST:
             self._moved = x, now
@@ -170,7 +170,7 @@ def looked_again(perceived: m.PruningPoints, place: m.UndecidedSite) -> m.Reason
     return made(place.vine, place.spur, left.reason)
 
 
-def _wheels(robot: Measured, speed: float, turning: float) -> Array:
+def wheels(robot: Measured, speed: float, turning: float) -> Array:
     """Wheel velocities (2, rad/s) that give the base a forward speed (m/s) and a yaw rate (rad/s)."""
     S, heading = robot.kinematics.S, float(robot.q[2])
     forward = math.cos(heading) * S[0, :2] + math.sin(heading) * S[1, :2]

@@ -1,23 +1,32 @@
-"""The file that keeps the camera's calibration: `camera.toml` in the robot's state folder."""
+"""The files that keep the calibrations, in the robot's state folder: `camera.toml` and `base.toml`."""
 
 import tomllib
 from pathlib import Path
+from typing import Any, TypeVar
 
 import msgspec
 import numpy as np
 
 from rolling_panda.errors import ConfigError
 from rolling_panda.messages.perception import CameraMount
+from rolling_panda.messages.robot import BaseCalibration
+from rolling_panda.model.differential_drive import WheelSizes
 from rolling_panda.model.robot import RobotModel, mount_pose, turn_and_shift
 from rolling_panda.runtime.state_folder import replace_durably
 
-FILE = "camera.toml"
+FILE, BASE_FILE = "camera.toml", "base.toml"
 #: A calibration that places the camera farther from the drawing than this (rad, m) is of another camera or bracket.
 FARTHEST_TURN, FARTHEST_SHIFT = 0.15, 0.05
 #: A calibration is old from this age on (s): work shakes brackets loose.
 OLD_S = 90 * 86400.0
+#: Largest difference of radii and track from those drawn, and of the radii from each other (shares).
+FARTHEST_WHEELS, FARTHEST_APART = 0.05, 0.02
 _HEAD = "# Where the camera is on the arm's flange. Without this file, perception takes it to be where it is drawn."
+_BASE_HEAD = "# Sizes of the base's wheels (m). Without this file, the bridge takes them to be as drawn."
 _REMEDY = "calibrate the camera again, or remove the file"
+_BASE_REMEDY = "calibrate the base again, or remove the file"
+
+Kept = TypeVar("Kept")
 
 
 def load(folder: Path, robot_id: str, drawn: RobotModel) -> CameraMount | None:
@@ -32,16 +41,9 @@ def load(folder: Path, robot_id: str, drawn: RobotModel) -> CameraMount | None:
         ConfigError: The file cannot be read, is of another robot, or its values are out of range.
     """
     path = folder / FILE
-    try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-        owner = document.pop("robot", "")
-        mount = msgspec.convert(document, CameraMount)
-    except FileNotFoundError:
+    mount = _read(path, robot_id, CameraMount, "a camera", _REMEDY)
+    if mount is None:
         return None
-    except (OSError, ValueError) as error:
-        raise ConfigError(f"{path} is no calibration of a camera: {error}; {_REMEDY}") from error
-    if owner != robot_id:
-        raise ConfigError(f"{path} is of the robot {owner!r}, and this is {robot_id!r}; {_REMEDY}")
     turn, shift = turn_and_shift(drawn.T_flange_camera, mount_pose(mount))
     if turn > FARTHEST_TURN or shift > FARTHEST_SHIFT:
         raise ConfigError(
@@ -57,7 +59,67 @@ def save(folder: Path, robot_id: str, mount: CameraMount) -> None:
     Raises:
         OSError: The file is not on disk.
     """
+    _write(folder / FILE, robot_id, mount, _HEAD)
+
+
+def load_base(folder: Path, robot_id: str, drawn: WheelSizes) -> BaseCalibration | None:
+    """The calibration of a robot's wheels; None where none was made.
+
+    Args:
+        folder: State folder of the robot.
+        robot_id: Its id.
+        drawn: The wheels as drawn.
+
+    Raises:
+        ConfigError: The file cannot be read, is of another robot, or its values are out of range.
+    """
+    path = folder / BASE_FILE
+    base = _read(path, robot_id, BaseCalibration, "a base", _BASE_REMEDY)
+    if base is not None and not plausible(base, drawn):
+        raise ConfigError(
+            f"{path} has wheels that differ from those drawn by more than {100 * FARTHEST_WHEELS:.0f} %, or from each "
+            f"other by more than {100 * FARTHEST_APART:.0f} %; {_BASE_REMEDY}"
+        )
+    return base
+
+
+def save_base(folder: Path, robot_id: str, base: BaseCalibration) -> None:
+    """Replace the calibration of a robot's wheels; an interruption leaves the old one or the new.
+
+    Raises:
+        OSError: The file is not on disk.
+    """
+    _write(folder / BASE_FILE, robot_id, base, _BASE_HEAD)
+
+
+def plausible(base: BaseCalibration, drawn: WheelSizes) -> bool:
+    """Whether wheels can have these sizes."""
+    shares = base.left / drawn.left, base.right / drawn.right, base.track / drawn.track
+    near = max(abs(share - 1.0) for share in shares) <= FARTHEST_WHEELS
+    return near and abs(base.right / base.left - 1.0) <= FARTHEST_APART
+
+
+def _read(path: Path, robot_id: str, kind: type[Kept], what: str, remedy: str) -> Kept | None:
+    """The calibration in a file; None without one.
+
+    Raises:
+        ConfigError: It cannot be read, or is of another robot.
+    """
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+        owner = document.pop("robot", "")
+        calibration = msgspec.convert(document, kind)
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError) as error:
+        raise ConfigError(f"{path} is no calibration of {what}: {error}; {remedy}") from error
+    if owner != robot_id:
+        raise ConfigError(f"{path} is of the robot {owner!r}, and this is {robot_id!r}; {remedy}")
+    return calibration
+
+
+def _write(path: Path, robot_id: str, calibration: Any, head: str) -> None:
     # Strings, numbers and lists of numbers are written alike in JSON and in TOML.
-    values = {"robot": robot_id} | msgspec.structs.asdict(mount)
+    values = {"robot": robot_id} | msgspec.structs.asdict(calibration)
     lines = [f"{name} = {msgspec.json.encode(value).decode()}" for name, value in values.items()]
-    replace_durably(folder / FILE, "\n".join((_HEAD, *lines, "")).encode())
+    replace_durably(path, "\n".join((head, *lines, "")).encode())

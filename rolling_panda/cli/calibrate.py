@@ -1,6 +1,6 @@
-"""`rolling-panda calibrate`: the board to print, and the camera's calibration by it.
+"""`rolling-panda calibrate`: the board to print, and the calibrations of camera and base by it.
 
-The arm is moved by the running program with all of its checks, as by a press of a button on the page. This command
+The robot is moved by the running program with all of its checks, as by a press of a button on the page. This command
 asks for it as a script does, watches, and shows the result.
 """
 
@@ -8,28 +8,33 @@ import argparse
 import getpass
 import math
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 from rolling_panda.errors import InputError, ServiceError
 
-#: Time between looks at the robot, for the state to show that it has begun, and time limit of a calibration (s).
-_POLL_S, _BEGUN_S, _LIMIT_S = 0.3, 3.0, 300.0
+#: Time between looks at the robot, for the state to show that it has begun, time limits of a calibration, and for the
+#: state to show that it is in use (s).
+_POLL_S, _BEGUN_S, _LIMIT_S, _USED_S = 0.3, 3.0, 600.0, 5.0
 _DPI, _SQUARE_PX = 600, 240
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The two commands."""
+    """What can be calibrated, and the board."""
     kinds = parser.add_subparsers(dest="kind", metavar="WHAT", required=True)
     board = kinds.add_parser("board", help="write the board as a PNG to print on A4 in its own size")
     board.add_argument("--out", type=Path, default=Path("board.png"), help="file (default: %(default)s)")
     camera = kinds.add_parser("camera", help="look at the board from all around, and place the camera on the arm by it")
-    camera.add_argument(
-        "page", help="a sign-in link of the page, which Invite makes and the demo prints; with --user its address alone"
-    )
-    camera.add_argument("--user", help="sign in by name and password in place of a link")
-    camera.add_argument("--yes", action="store_true", help="move, and use the result, without asking")
+    base = kinds.add_parser("base", help="drive and turn before the board, and measure the wheels by it")
+    for kind in (camera, base):
+        kind.add_argument(
+            "page",
+            help="a sign-in link of the page, which Invite makes and the demo prints; with --user its address alone",
+        )
+        kind.add_argument("--user", help="sign in by name and password in place of a link")
+        kind.add_argument("--yes", action="store_true", help="move, and use the result, without asking")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -39,7 +44,9 @@ def run(arguments: argparse.Namespace) -> int:
         InputError: The board cannot be written, or the link is none.
         ServiceError: The page does not answer, or refuses.
     """
-    return _write_board(arguments.out) if arguments.kind == "board" else _calibrate_camera(arguments)
+    if arguments.kind == "board":
+        return _write_board(arguments.out)
+    return _calibrate_camera(arguments) if arguments.kind == "camera" else _calibrate_base(arguments)
 
 
 def _write_board(out: Path) -> int:
@@ -71,7 +78,7 @@ def _calibrate_camera(arguments: argparse.Namespace) -> int:
         if page.mode() == "IDLE":
             page.post("arm")
         page.post("camera/calibrate")
-        mode = page.watch()
+        mode = page.watch(lambda: int(page.get("camera")["views"]))
         print(f"\n{page.newest_event()}")
         result = page.get("camera")
         offer = result["offer"]
@@ -84,6 +91,49 @@ def _calibrate_camera(arguments: argparse.Namespace) -> int:
             return 1
         print(page.post("camera/use", {"made_at": offer["made_at"]}))
     return 0
+
+
+def _calibrate_base(arguments: argparse.Namespace) -> int:
+    with _Page(arguments.page, arguments.user) as page:
+        used = page.get("state")["bridge"]
+        print(f"In use: {_wheels_told(None if used is None else used['base'])}")
+        if not arguments.yes and not _agreed(
+            "Is the board 45 cm before the camera in its survey posture, the ground firm, and half a metre free before "
+            "and behind the base? It will drive and turn."
+        ):
+            return 1
+        if page.mode() == "IDLE":
+            page.post("arm")
+        page.post("base/calibrate")
+        mode = page.watch(lambda: int(page.get("calibration")["base_views"]))
+        print(f"\n{page.newest_event()}")
+        result = page.get("calibration")
+        offer = result["base"]
+        if mode != "READY" or offer is None:
+            refused = result["base_refused"]
+            print(f"No calibration: {page.words(refused)}" if refused else "No calibration.")
+            print("The calibration in use stays as it is.")
+            return 1
+        print(f"New:    {_wheels_told(offer)}")
+        if not arguments.yes and not _agreed("Use it?"):
+            return 1
+        page.post("base/use", {"made_at": offer["made_at"]})
+        if not page.waits_for(lambda: (page.get("state")["bridge"] or {}).get("base") == offer):
+            print(f"It is not in use: {page.newest_event()}")
+            return 1
+        print("It is in use.")
+    return 0
+
+
+def _wheels_told(base: dict[str, Any] | None) -> str:
+    if base is None:
+        return "the wheels are taken to be as drawn"
+    made = time.strftime("%Y-%m-%d %H:%M", time.localtime(base["made_at"]))
+    return (
+        f"{made}, {base['views']} views: radius {1e3 * base['left']:.2f} and {1e3 * base['right']:.2f} mm, track "
+        f"{1e3 * base['track']:.2f} mm; standard deviation {100 * base['radius_sd']:.2f} % and "
+        f"{100 * base['track_sd']:.2f} %; slip {100 * base['slip']:.2f} %"
+    )
 
 
 def _told(mount: dict[str, Any] | None) -> str:
@@ -139,14 +189,25 @@ class _Page:
             raise ServiceError("the controller has not reported; is it running?")
         return str(controller["mode"])
 
-    def watch(self) -> str:
-        """Watch the robot until its work has ended; returns its mode then. Ctrl-C pauses it."""
+    def waits_for(self, condition: Callable[[], bool]) -> bool:
+        """Whether a condition comes true soon."""
+        end = time.monotonic() + _USED_S
+        while not (met := condition()) and time.monotonic() < end:
+            time.sleep(_POLL_S)
+        return met
+
+    def watch(self, views: Callable[[], int]) -> str:
+        """Watch the robot until its work has ended; returns its mode then. Ctrl-C pauses it.
+
+        Args:
+            views: Counts the pictures of the board.
+        """
         begun, start = False, time.monotonic()
         try:
             while time.monotonic() - start < _LIMIT_S:
                 time.sleep(_POLL_S)
                 mode = self.mode()
-                print(f"\r{self.get('camera')['views']} views of the board", end="", flush=True)
+                print(f"\r{views()} views of the board", end="", flush=True)
                 begun = begun or mode == "AUTO"
                 if mode != "AUTO" and (begun or time.monotonic() - start > _BEGUN_S):
                     return mode

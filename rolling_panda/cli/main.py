@@ -61,8 +61,8 @@ _OWN: dict[str, tuple[Any, str, str]] = {
     ),
     "calibrate": (
         calibrate,
-        "where the camera is on the arm: print the board, look at it from all around",
-        "Print the board of the calibration, or let the running robot look at it and place the camera on the arm.",
+        "where the camera is on the arm, how large the wheels are: print the board, look at it from all around",
+        "Print the board of the calibration, or let the running robot look at it and measure its camera or its wheels.",
     ),
     "status": (
         status,

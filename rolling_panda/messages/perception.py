@@ -6,6 +6,7 @@ from typing import Annotated, Final, Literal
 import msgspec
 from msgspec import Meta, Struct
 
+from rolling_panda.messages.robot import BaseCalibration
 from rolling_panda.messages.types import (
     Count,
     Covariance,
@@ -313,6 +314,8 @@ class Capsule(Struct, frozen=True, forbid_unknown_fields=True):
 CALIBRATION: Final = "calibration:"
 #: The same of a picture of the row from another pose, to check the calibration by.
 CHECK: Final = "check:"
+#: The same of a picture of the board between the drives of the base's calibration.
+BASE: Final = "base:"
 
 
 class CameraMount(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -366,6 +369,22 @@ class CameraState(Message, frozen=True, kw_only=True):
     turned_sd: Vector3 | None = None
     observations: Count = 0
     warning: Reason | None = None
+
+
+class RobotCalibration(Message, frozen=True, kw_only=True):
+    """Perception → controller and server: what pictures of the board tell of the robot itself.
+
+    Attributes:
+        header: Stamp of the newest picture.
+        base_views: Pictures of the board since the last calibration of the base began.
+        base: A new calibration of the base, which `UseBase` takes; None without one.
+        base_refused: Why the last calibration of the base gave none; None if it gave one, or before the first.
+    """
+
+    header: Header
+    base_views: Count = 0
+    base: BaseCalibration | None = None
+    base_refused: Reason | None = None
 
 
 class Scenery(Message, frozen=True, kw_only=True):

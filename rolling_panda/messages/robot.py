@@ -24,6 +24,7 @@ from rolling_panda.messages.types import (
     Reason,
     Speed,
     Text,
+    WallTime,
 )
 
 
@@ -157,6 +158,49 @@ class RejectionCount(Struct, frozen=True, forbid_unknown_fields=True):
     count: Count
 
 
+#: 5 % about the radius and the track as drawn (m).
+Radius = Annotated[float, Meta(ge=0.127, le=0.141)]
+Track = Annotated[float, Meta(ge=0.48, le=0.535)]
+
+
+class BaseCalibration(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Calibration of the base's wheels.
+
+    Attributes:
+        left: Rolling radius of the left wheel (m).
+        right: Rolling radius of the right wheel (m).
+        track: Distance between the wheels' contacts (m).
+        made_at: Time of the calibration.
+        views: Number of pictures of the board.
+        radius_sd: Standard deviation of the radii, as a share of them.
+        apart_sd: The same of the difference between right and left.
+        track_sd: The same of the track.
+        slip: By how much the base went otherwise than its wheels, as a share of the way (root mean square).
+    """
+
+    left: Radius
+    right: Radius
+    track: Track
+    made_at: WallTime = 0.0
+    views: Count = 0
+    radius_sd: NonNegative = 0.0
+    apart_sd: NonNegative = 0.0
+    track_sd: NonNegative = 0.0
+    slip: NonNegative = 0.0
+
+
+class UseCalibration(Message, frozen=True, kw_only=True):
+    """Controller → bridge: use a calibration from now on, and after a restart. It moves nothing.
+
+    Attributes:
+        user: Who wants it.
+        base: Of the base.
+    """
+
+    user: Text
+    base: BaseCalibration
+
+
 class BridgeState(Message, frozen=True, kw_only=True):
     """Bridge → all: stop latch, watchdog and cutter of the bridge. The controller can override none of them.
 
@@ -181,6 +225,7 @@ class BridgeState(Message, frozen=True, kw_only=True):
         battery: Charge of the base, 0 … 1; None if unknown, as in simulation.
         arm_success: Fraction of the arm's last 100 commands that arrived in time; None if unknown, as in simulation.
         relaxed_limits: Safety limits that its configuration sets less strictly than usual, within their hard bounds.
+        base: Calibration of the wheels in use; None while they are taken to be as drawn.
     """
 
     header: Header
@@ -202,6 +247,7 @@ class BridgeState(Message, frozen=True, kw_only=True):
     holder: Annotated[str, Meta(max_length=16)] = ""
     sequence: Count = 0
     moving: bool = False
+    base: BaseCalibration | None = None
 
 
 class ReleaseStop(Message, frozen=True, kw_only=True):
@@ -253,6 +299,8 @@ class CameraFrame(Message, frozen=True, kw_only=True):
         labels_zlib: H×W uint8 class indices (`WOOD_CLASSES`), zlib. Empty without a label camera (a real robot).
         point_id: Point of the requested close-up; empty in other frames.
         number: `number` of the close-up request.
+        wheels: Sizes of the wheels by which `base` and the wheels' `position` were computed: left and right radius and
+            track (m). None for those drawn.
     """
 
     header: Header
@@ -266,3 +314,4 @@ class CameraFrame(Message, frozen=True, kw_only=True):
     labels_zlib: bytes = b""
     point_id: Annotated[str, Meta(max_length=64)] = ""
     number: Count = 0
+    wheels: tuple[Radius, Radius, Track] | None = None

@@ -19,6 +19,26 @@ _ACTUATED = np.vstack([np.zeros((NQ - NXI, NXI)), np.eye(NXI)])
 
 
 @dataclass(frozen=True)
+class WheelSizes:
+    """Measured sizes of the two wheels, which need not be alike.
+
+    Attributes:
+        left: Rolling radius of the left wheel (m).
+        right: Rolling radius of the right wheel (m).
+        track: Distance between their contacts (m).
+    """
+
+    left: float
+    right: float
+    track: float
+
+    def motion(self) -> Array:
+        """2×2: turns angles of the left and right wheel (rad) into the axle centre's way (m) and turn (rad)."""
+        left, right, track = self.left, self.right, self.track
+        return np.array([[left / 2, right / 2], [-left / track, right / track]])
+
+
+@dataclass(frozen=True)
 class DifferentialDrive:
     """Geometry of the base.
 
@@ -53,6 +73,11 @@ class DifferentialDrive:
         S[2, 0], S[2, 1] = -turn, turn
         return S
 
+    @property
+    def sizes(self) -> WheelSizes:
+        """Both wheels as drawn."""
+        return WheelSizes(self.wheel_radius, self.wheel_radius, 2 * self.half_track)
+
     def twist(self, wheel_left: float, wheel_right: float) -> tuple[float, float]:
         """Forward velocity of the axle centre (m/s) and yaw rate (rad/s) from the wheel speeds (rad/s)."""
         v = self.wheel_radius * (wheel_left + wheel_right) / 2
@@ -75,10 +100,13 @@ class DifferentialDrive:
         """`integrate` for plain numbers."""
         distance, angle = self.twist(turned_left, turned_right)
         x, y, phi = pose
-        x, y = x - self.rho * math.cos(phi), y - self.rho * math.sin(phi)
-        # Chord of the arc.
-        half = angle / 2
-        chord = distance * math.sin(half) / half if half != 0.0 else distance
-        x, y = x + chord * math.cos(phi + half), y + chord * math.sin(phi + half)
-        phi += angle
+        x, y, phi = arc((x - self.rho * math.cos(phi), y - self.rho * math.sin(phi), phi), distance, angle)
         return x + self.rho * math.cos(phi), y + self.rho * math.sin(phi), phi
+
+
+def arc(pose: Pose, distance: float, angle: float) -> Pose:
+    """Pose of the axle centre after an arc of a length (m) that turns by an angle (rad)."""
+    x, y, phi = pose
+    half = angle / 2
+    chord = distance * math.sin(half) / half if half != 0.0 else distance
+    return x + chord * math.cos(phi + half), y + chord * math.sin(phi + half), phi + angle

@@ -23,6 +23,7 @@ CALLERS: dict[str, tuple[m.Process, ...]] = {
     "service/intent": ("server",),
     "service/release": ("controller",),
     "service/plant": ("server",),
+    "service/calibration": ("controller",),
     "service/seek": ("server",),
 }
 _PUBLISHED = ("put", "delete")

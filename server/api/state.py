@@ -13,7 +13,7 @@ from pydantic import BaseModel, Field
 from rolling_panda import reasons
 from rolling_panda.cut_pictures import Moment
 from rolling_panda.messages.page import Diagnostics, PageEvents, PagePoints, PageState
-from rolling_panda.messages.perception import CameraState
+from rolling_panda.messages.perception import CameraState, RobotCalibration
 from rolling_panda.messages.supervision import CutReport, SessionPlan, SessionReport, Timeline
 from rolling_panda.reasons import text_of
 from server.api.dependencies import Caller, PointId, activity
@@ -105,6 +105,14 @@ def state_router(robot: RobotContext) -> APIRouter:
     async def camera(session: Caller) -> Response:
         """The camera's calibration, the one on offer, and the monitor's estimate of its error."""
         received = robot.link.camera_state.peek()
+        if received is None:
+            return answer(Result(503, reasons.not_reported("perception")))
+        return message(received.message)
+
+    @router.get("/calibration", tags=["state"], responses=query(RobotCalibration, UNAVAILABLE))
+    async def calibration(session: Caller) -> Response:
+        """What pictures of the board tell of the base. The calibration in use is in the bridge's state."""
+        received = robot.link.robot_calibration.peek()
         if received is None:
             return answer(Result(503, reasons.not_reported("perception")))
         return message(received.message)

@@ -74,6 +74,7 @@ class RobotLink:
         self.scenery = transport.slot(topics.SCENERY)
         self.obstacles = transport.slot(topics.OBSTACLES)
         self.camera_state = transport.slot(topics.CAMERA_STATE)
+        self.robot_calibration = transport.slot(topics.ROBOT_CALIBRATION)
         self.pictures = PictureStore()
         transport.subscribe(topics.PICTURES, lambda picture, at: self.pictures.add(picture))
         self.control = transport.slot(topics.CONTROL)

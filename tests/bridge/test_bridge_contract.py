@@ -88,6 +88,27 @@ def test_base_and_arm_follow_and_the_telemetry_says_what_they_do(rig: Rig) -> No
     assert rig.plant.breaches() == []
 
 
+def test_calibrated_wheels_turn_as_the_ground_needs_and_the_odometry_tells_the_way(rig: Rig) -> None:
+    drawn = MODEL.drive.sizes
+    larger = m.BaseCalibration(left=drawn.left * 1.04, right=drawn.right * 1.04, track=drawn.track, made_at=5.0)
+    rig.drive_on()
+    assert not rig.core.on_calibration(m.UseCalibration(user="ada", base=larger)).ok, "in motion"
+    rig.run(0.8, REST)
+    assert rig.until(rig.at_rest, REST)
+    assert rig.core.on_calibration(m.UseCalibration(user="ada", base=larger)).ok
+    assert rig.until(lambda: rig.state.base == larger, REST)
+
+    def followed() -> bool:
+        odometry = next(out.odometry for out in reversed(rig.outputs) if out.odometry)
+        wheels = np.array(FORWARD[:2]) / 1.04
+        return odometry.linear == pytest.approx(0.2, abs=0.01) and rig.plant.velocity()[:2] == pytest.approx(
+            wheels, abs=0.02
+        )
+
+    assert rig.until(followed, FORWARD)
+    assert rig.plant.breaches() == []
+
+
 def felt(rig: Rig) -> tuple[float, ...] | None:
     return next(out.joints for out in reversed(rig.outputs) if out.joints).external_torque
 

@@ -13,7 +13,14 @@ from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.commands import SetRule
 from rolling_panda.errors import RollingPandaError
-from rolling_panda.messages.perception import CameraState, Capsule, CloseUpResult, SpurDrawing, SpurPicture
+from rolling_panda.messages.perception import (
+    CameraState,
+    Capsule,
+    CloseUpResult,
+    RobotCalibration,
+    SpurDrawing,
+    SpurPicture,
+)
 from rolling_panda.messages.robot import CameraFrame, Intrinsics
 from rolling_panda.reasons import severity_of
 from rolling_panda.topics import (
@@ -27,6 +34,7 @@ from rolling_panda.topics import (
     PICTURES,
     PLANT,
     POINTS,
+    ROBOT_CALIBRATION,
 )
 from rolling_panda.transport.runner import Runner
 from tests.support.fake_wire import FakeWire
@@ -73,6 +81,7 @@ class FakePerception:
         self.release, self.noted, self.newest, self.processed = threading.Event(), [], None, 0
         self.camera = SimpleNamespace(state=CameraState(header=m.Header()))
         self.localisation = RowFrame(True).message(0.0)
+        self.calibrator = SimpleNamespace(state=RobotCalibration(header=m.Header()))
         self.camera_rays = SimpleNamespace(add=lambda frame: self.noted.append(frame.header.frame_id))
 
     def answer(self, request):
@@ -170,6 +179,17 @@ def test_the_place_in_the_row_is_told_once_a_second_and_at_once_when_the_robot_i
         step_until(loop, lambda: told[-1].reason == lost, second)
     assert len(told) == 3
     assert [event.reason for event in events].count(lost) == 1
+
+
+def test_what_pictures_of_the_board_tell_is_sent_when_it_changes(parts):
+    wire, perception, loop = parts
+    told = wire.sent[ROBOT_CALIBRATION.name]
+    loop.step(0.0)
+    loop.step(0.1)
+    assert [state.base_views for state in told] == [0]
+    perception.calibrator.state = RobotCalibration(header=m.Header(1.0), base_views=4)
+    loop.see("frame", 1.0)
+    step_until(loop, lambda: told[-1].base_views == 4, 1.0)
 
 
 def test_what_was_left_out_is_told_when_it_changes_and_at_most_once_a_minute(parts):

@@ -27,6 +27,19 @@ OFFER = {
 }
 
 
+WHEELS: dict[str, object] = {
+    "made_at": 1.8e9,
+    "views": 33,
+    "left": 0.1325,
+    "right": 0.1326,
+    "track": 0.511,
+    "radius_sd": 0.001,
+    "apart_sd": 0.001,
+    "track_sd": 0.002,
+    "slip": 0.003,
+}
+
+
 class PlayedPage:
     """The page's server. `modes` are told one after another, the last one for ever."""
 
@@ -36,20 +49,28 @@ class PlayedPage:
         self.refused: dict[str, object] | None = None
         self.refusal: dict[str, int] = {}
         self.interrupts = False
+        self.base: dict[str, object] | None = None
+        self.base_offer: dict[str, object] | None = WHEELS
+        self.base_refused: dict[str, object] | None = None
         self.posted: list[tuple[str, object]] = []
 
     def answer(self, request: httpx.Request) -> httpx.Response:
         path = request.url.path.removeprefix("/api/")
         if request.method == "POST":
             self.posted.append((path, json.loads(request.content) if request.content else None))
+            if path == "base/use" and path not in self.refusal:
+                self.base = self.base_offer
             return httpx.Response(self.refusal.get(path, 200), json={"reason": f"{path} is told"})
         if path == "state":
             if self.interrupts and ("camera/calibrate", None) in self.posted and ("pause", None) not in self.posted:
                 raise KeyboardInterrupt
             mode = self.modes[0] if len(self.modes) == 1 else self.modes.pop(0)
-            return httpx.Response(200, json={"controller": {"mode": mode}})
+            return httpx.Response(200, json={"controller": {"mode": mode}, "bridge": {"base": self.base}})
         if path == "camera":
             return httpx.Response(200, json={"mount": None, "views": 7, "offer": self.offer, "refused": self.refused})
+        if path == "calibration":
+            found = {"base_views": 33, "base": self.base_offer, "base_refused": self.base_refused}
+            return httpx.Response(200, json=found)
         return httpx.Response(200, json={"events": [{"text": "25 of 25 pictures show the board"}]})
 
 
@@ -59,6 +80,7 @@ def page(monkeypatch: pytest.MonkeyPatch) -> PlayedPage:
     transport = httpx.MockTransport(played.answer)
     monkeypatch.setattr(httpx, "Client", functools.partial(httpx.Client, transport=transport))
     monkeypatch.setattr(calibrate, "_POLL_S", 0.0)
+    monkeypatch.setattr(calibrate, "_USED_S", 0.01)
     return played
 
 
@@ -140,3 +162,36 @@ def test_a_link_that_signs_nobody_in_is_an_error(link: str, capsys: pytest.Captu
 def test_a_page_that_does_not_answer_is_an_error(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["calibrate", "camera", "http://127.0.0.1:9/sign-in?token=abc", "--yes"]) != 0
     assert "the page does not answer" in capsys.readouterr().err
+
+
+def test_the_base_is_calibrated_and_the_result_used(page: PlayedPage, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["calibrate", "base", LINK, "--yes"]) == 0
+    assert page.posted == [
+        ("sign-in", {"token": "abc"}),
+        ("base/calibrate", None),
+        ("base/use", {"made_at": 1.8e9}),
+    ]
+    told = capsys.readouterr().out
+    assert "taken to be as drawn" in told and "radius 132.50 and 132.60 mm, track 511.00 mm" in told
+
+
+def test_a_refused_calibration_of_the_base_says_why(page: PlayedPage, capsys: pytest.CaptureFixture[str]) -> None:
+    page.base_offer, page.base_refused = None, msgspec.to_builtins(reasons.base_slipped(2.5, 1.0))
+    assert main(["calibrate", "base", LINK, "--yes"]) == 1
+    told = capsys.readouterr().out
+    assert reasons.text_of(reasons.base_slipped(2.5, 1.0)) in told and "stays as it is" in told
+    assert "base/use" not in [path for path, _ in page.posted]
+
+
+def test_a_base_that_the_bridge_does_not_take_is_no_success(
+    page: PlayedPage, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page.refusal = {"base/use": 200}
+    assert main(["calibrate", "base", LINK, "--yes"]) == 1
+    assert "not in use" in capsys.readouterr().out
+
+
+def test_without_a_yes_the_base_does_not_move(page: PlayedPage, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("builtins.input", lambda _: "n")
+    assert main(["calibrate", "base", LINK]) == 1
+    assert [path for path, _ in page.posted] == ["sign-in"]

@@ -1,4 +1,4 @@
-"""The file of the camera's calibration: read at the next start, and refused where it is not of this robot's camera."""
+"""The files of the calibrations: read at the next start, and refused where they are not of this robot."""
 
 import math
 
@@ -6,10 +6,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rolling_panda.calibration.file import FILE, load, save
+from rolling_panda.calibration.file import BASE_FILE, FILE, load, load_base, save, save_base
 from rolling_panda.errors import ConfigError
 from rolling_panda.messages.perception import CameraMount
-from rolling_panda.messages.robot import Intrinsics
+from rolling_panda.messages.robot import BaseCalibration, Intrinsics
 from rolling_panda.model.robot import RobotModel, mount_pose, pose_message
 
 MODEL = RobotModel()
@@ -65,3 +65,48 @@ def test_a_mounted_camera_and_its_lens_are_used_until_they_are_taken_off():
     assert math.isclose(model.lens(lens).fx, 1.003 * 447.0) and model.lens(lens).cx == 423.5
     model.mount_camera(None)
     assert model.pose(q, model.camera_id).isApprox(drawn) and model.lens(lens) == lens
+
+
+DRAWN = MODEL.drive.sizes
+
+
+def base(**changes):
+    numbers = {"left": DRAWN.left * 0.99, "right": DRAWN.right * 0.991, "track": DRAWN.track * 1.01, "made_at": 1.8e9}
+    return BaseCalibration(**(numbers | {"views": 33, "radius_sd": 0.001, "track_sd": 0.002} | changes))
+
+
+def test_measured_wheels_are_read_at_the_next_start(tmp_path):
+    assert load_base(tmp_path, "rp1", DRAWN) is None
+    save_base(tmp_path, "rp1", base(views=3))
+    save_base(tmp_path, "rp1", base())
+    assert load_base(tmp_path, "rp1", DRAWN) == base()
+    assert load(tmp_path, "rp1", MODEL) is None, "a file of its own"
+
+
+@pytest.mark.parametrize(
+    ("spoil", "says"),
+    [
+        (lambda text: text.replace('"rp1"', '"rp2"'), "'rp2'"),
+        (lambda text: text.replace("left = 0.1", "left = 0.2"), "left"),
+        (lambda text: text.replace("track = 0.5", "track = nan # 0.5"), "track"),
+        (lambda text: text.replace("views", "wiews"), "wiews"),
+        (lambda text: "", "left"),
+    ],
+)
+def test_a_file_of_other_wheels_is_refused_with_what_to_do(tmp_path, spoil, says):
+    save_base(tmp_path, "rp1", base())
+    path = tmp_path / BASE_FILE
+    path.write_text(spoil(path.read_text()))
+    with pytest.raises(ConfigError) as refused:
+        load_base(tmp_path, "rp1", DRAWN)
+    assert says in str(refused.value) and "calibrate the base again" in str(refused.value), refused.value
+
+
+def test_wheels_far_from_those_drawn_or_from_each_other_are_refused(tmp_path):
+    for far in ({"left": 0.1275, "right": 0.1275}, {"track": 0.4801}, {"left": DRAWN.left * 1.02}):
+        save_base(tmp_path, "rp1", base(**far))
+        if far.get("left") == 0.1275:
+            assert load_base(tmp_path, "rp1", DRAWN) is not None
+            continue
+        with pytest.raises(ConfigError, match="differ from those drawn"):
+            load_base(tmp_path, "rp1", DRAWN)

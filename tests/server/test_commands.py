@@ -89,6 +89,8 @@ def client(server):
         ("look-again", {"vine": 2, "spur": 3}, intents.LookAgain(user="ann", vine=2, spur=3)),
         ("camera/check", None, intents.CheckCamera(user="ann")),
         ("camera/calibrate", None, intents.CalibrateCamera(user="ann")),
+        ("base/calibrate", None, intents.CalibrateBase(user="ann")),
+        ("base/use", {"made_at": 5.0}, intents.UseBase(user="ann", made_at=5.0)),
         ("acknowledge", None, intents.Acknowledge(user="ann")),
         ("reset", {"reason": "checked"}, intents.Reset(user="ann", reason="checked")),
         ("control/take", {"confirm": True}, intents.TakeControl(user="ann", confirm=True)),

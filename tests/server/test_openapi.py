@@ -7,7 +7,7 @@ import schemathesis
 from schemathesis.engine import events, from_schema
 
 from rolling_panda import topics
-from rolling_panda.messages.perception import CameraState, DrawnCut, SpurDrawing, SpurPicture
+from rolling_panda.messages.perception import CameraState, DrawnCut, RobotCalibration, SpurDrawing, SpurPicture
 from rolling_panda.messages.robot import CameraFrame, Intrinsics
 from rolling_panda.messages.supervision import (
     ControlState,
@@ -74,6 +74,7 @@ class Answering(FakeWire):
         self.deliver(topics.PICTURES, SpurPicture(drawing=DRAWING, jpeg=b"jpeg"))
         self.deliver(topics.CAMERA, FRAME)
         self.deliver(topics.CAMERA_STATE, CameraState(header=HEADER))
+        self.deliver(topics.ROBOT_CALIBRATION, RobotCalibration(header=HEADER))
         self.deliver(topics.PLAN, SessionPlan(header=HEADER, state="planning"))
         self.deliver(topics.REPORT, SessionReport(began_at=1.0, written_at=2.0))
         self.deliver(topics.TIMELINE, Timeline(began_at=1.0, ended_at=2.0))

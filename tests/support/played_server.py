@@ -18,7 +18,7 @@ from rolling_panda import reasons
 from rolling_panda.commands import COMMANDS
 from rolling_panda.messages import page as page_messages
 from rolling_panda.messages import types as types_messages
-from rolling_panda.messages.perception import CameraState, SpurDrawing
+from rolling_panda.messages.perception import CameraState, RobotCalibration, SpurDrawing
 from rolling_panda.messages.supervision import ControlState, ReplayState, SessionReport, StopState, Timeline
 from rolling_panda.reasons import said
 from rolling_panda.resources import resource
@@ -43,11 +43,20 @@ STILL = (
 )
 COMMAND_NAMES = tuple(command.name for command in COMMANDS if command.process == "controller" or command.modes)
 ALLOWED = {
-    "IDLE": ("Arm", "UseCamera"),
-    "READY": ("Start", "Home", "Teleoperation", "UseCamera", "CheckCamera", "CalibrateCamera"),
+    "IDLE": ("Arm", "UseCamera", "UseBase"),
+    "READY": (
+        "Start",
+        "Home",
+        "Teleoperation",
+        "UseCamera",
+        "CheckCamera",
+        "CalibrateCamera",
+        "UseBase",
+        "CalibrateBase",
+    ),
     "AUTO": ("Pause",),
     "TELEOP": ("Pause", "Teleoperation"),
-    "PAUSED": ("Resume", "UseCamera"),
+    "PAUSED": ("Resume", "UseCamera", "UseBase"),
     "ESTOP_LATCHED": ("Reset",),
 }
 
@@ -136,6 +145,7 @@ class PlayedServer:
     plain_wire: bool = False
     relaxed_limits: tuple[m.Reason, ...] = ()
     camera: CameraState = field(default_factory=lambda: CameraState(header=m.Header()))
+    calibration: RobotCalibration = field(default_factory=lambda: RobotCalibration(header=m.Header()))
     online: bool = True
     silent: bool = False
     #: How long ago it heard each process, where none is gone (s).
@@ -185,7 +195,7 @@ class PlayedServer:
             return JSONResponse({"arm_limits": [(-2.9, 2.9)] * 7})
         if path == "/api/sign-in":
             return JSONResponse({"password": False})
-        for name in ("report", "timeline", "diagnostics", "camera"):
+        for name in ("report", "timeline", "diagnostics", "camera", "calibration"):
             if path == f"/api/{name}":
                 return Response(msgspec.json.encode(getattr(self, name)), media_type="application/json")
         if path.startswith("/api/cuts/"):

@@ -7,7 +7,9 @@ import pytest
 from playwright.sync_api import Locator, Page, expect
 
 from rolling_panda import messages as m
-from rolling_panda.messages.perception import CameraMount, CameraState
+from rolling_panda import reasons
+from rolling_panda.messages.perception import CameraMount, CameraState, RobotCalibration
+from rolling_panda.messages.robot import BaseCalibration
 from tests.support.page_parts import open_screen, show_mode
 from tests.support.played_page import box_of, until
 from tests.support.played_server import PlayedServer, bridge, controller, diagnostics
@@ -156,6 +158,33 @@ def test_the_cameras_calibration_is_told_checked_and_taken_from_its_panel(page: 
     use.click()
     until(page, lambda: server.posted[-1] == ("/api/camera/use", {"made_at": 5.0}))
     show_mode(page, server, controller("AUTO"))
+    expect(use).to_have_attribute("aria-disabled", "true")
+
+
+def test_the_bases_calibration_is_told_measured_and_taken_from_the_panel(page: Page, server: PlayedServer) -> None:
+    panel = page.locator("rp-calibration")
+    use, row = panel.locator("#use-base"), lambda name: panel.locator(f'[data-calibration="{name}"]')
+    show_mode(page, server, controller("READY"))
+    open_screen(page, "engineer")
+    expect(row("base")).to_have_text("none: the wheels are taken to be as drawn")
+    expect(row("base_offer")).to_have_text("none")
+    expect(use).to_have_attribute("aria-disabled", "true")
+    panel.locator("#calibrate-base").click()
+    until(page, lambda: [path for path, _ in server.posted] == ["/api/base/calibrate"])
+    server.calibration = RobotCalibration(header=m.Header(), base_views=33, base_refused=reasons.base_slipped(2.5, 1.0))
+    expect(row("base_offer")).to_contain_text("The wheels slipped", timeout=6000)
+    expect(use).to_have_attribute("aria-disabled", "true")
+    made = BaseCalibration(
+        left=0.1325, right=0.1326, track=0.511, made_at=5.0, views=33, radius_sd=0.001, track_sd=0.002
+    )
+    server.calibration = RobotCalibration(header=m.Header(), base_views=33, base=made)
+    measured = "from 33 pictures: wheels 132.50 and 132.60 mm, track 511.00 mm (±\u00a00.10 %, ±\u00a00.20 %)"
+    expect(row("base_offer")).to_contain_text(measured, timeout=6000)
+    use.click()
+    until(page, lambda: server.posted[-1] == ("/api/base/use", {"made_at": 5.0}))
+    server.bridge = bridge(base=made)
+    expect(row("base")).to_contain_text(measured)
+    expect(row("base_offer")).to_have_text("none")
     expect(use).to_have_attribute("aria-disabled", "true")
 
 

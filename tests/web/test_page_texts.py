@@ -93,7 +93,7 @@ FAMILIES: dict[str, Sequence[str]] = {
     "topics.${}": TOPIC_COLUMNS,
     "topics.${}.hint": TOPIC_COLUMNS,
     "models.${}": ("network", "method", "robot", "plan", "preview", "point", "revision", "state", "digest"),
-    "calibration.${}": ("used", "seen", "offer"),
+    "calibration.${}": ("used", "seen", "offer", "base", "base_offer"),
     "models.robot.${}": get_args(types.BridgeKind),
     "report.column.${}": COLUMNS,
     "severity.${}": get_args(types.Severity),

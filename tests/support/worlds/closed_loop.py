@@ -18,7 +18,7 @@ from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.closing import Closing
 from rolling_panda.config import RobotConfig, load_section
-from rolling_panda.messages.perception import Obstacles
+from rolling_panda.messages.perception import BASE, Obstacles
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.messages.supervision import Person, Presence
 from rolling_panda.model.differential_drive import Array
@@ -57,6 +57,8 @@ class PerceptionInTime:
             obstacles = Obstacles(header=points.header, capsules=self._perception.obstacles)
             for message in (points, obstacles, self._perception.localisation):
                 self._made.append((now + _PERCEPTION_S, message))
+            if frame.message.point_id.startswith(BASE):
+                self._made.append((now + _PERCEPTION_S, self._perception.calibrator.state))
         self._beats += 1
         out: list[object] = [m.Heartbeat(process="perception", sequence=self._beats)]
         out += [message for due, message in self._made if now >= due]

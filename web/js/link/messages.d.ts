@@ -268,6 +268,28 @@ export interface RejectionCount {
   count: number;
 }
 
+/** Calibration of the base's wheels. */
+export interface BaseCalibration {
+  /** Rolling radius of the left wheel (m). */
+  left: number;
+  /** Rolling radius of the right wheel (m). */
+  right: number;
+  /** Distance between the wheels' contacts (m). */
+  track: number;
+  /** Time of the calibration. */
+  made_at: number;
+  /** Number of pictures of the board. */
+  views: number;
+  /** Standard deviation of the radii, as a share of them. */
+  radius_sd: number;
+  /** The same of the difference between right and left. */
+  apart_sd: number;
+  /** The same of the track. */
+  track_sd: number;
+  /** By how much the base went otherwise than its wheels, as a share of the way (root mean square). */
+  slip: number;
+}
+
 /** Bridge → all: stop latch, watchdog and cutter of the bridge. The controller can override none of them. */
 export interface BridgeState {
   type: "BridgeState";
@@ -309,6 +331,8 @@ export interface BridgeState {
   sequence: number;
   /** Whether any actuator is sent a velocity other than zero. */
   moving: boolean;
+  /** Calibration of the wheels in use; None while they are taken to be as drawn. */
+  base: BaseCalibration|null;
 }
 
 /** Bridge → all: measured actuated coordinates, like sensor_msgs/JointState. */
@@ -897,6 +921,19 @@ export interface CameraState {
   observations: number;
   /** What is wrong with the calibration; None if nothing is known. */
   warning: Reason|null;
+}
+
+/** Perception → controller and server: what pictures of the board tell of the robot itself. */
+export interface RobotCalibration {
+  type: "RobotCalibration";
+  /** Stamp of the newest picture. */
+  header: Header;
+  /** Pictures of the board since the last calibration of the base began. */
+  base_views: number;
+  /** A new calibration of the base, which `UseBase` takes; None without one. */
+  base: BaseCalibration|null;
+  /** Why the last calibration of the base gave none; None if it gave one, or before the first. */
+  base_refused: Reason|null;
 }
 
 /** A cut as it is drawn on a picture. */
