@@ -65,6 +65,10 @@ class BaseViews:
         self._rested_at: float | None = None
         self._asked = ""
 
+    def hold(self) -> None:
+        """The robot stands for one period: nothing is held back."""
+        self._moved = math.inf, 0.0
+
     def step(self, robot: Measured, now: float) -> StepResult:
         """One period.
 

@@ -19,7 +19,7 @@ from rolling_panda.topics import INTENT, PLANT
 VALUES = {
     "point_id": "p1", "revision": 1, "vine": 1, "spur": 1, "reason": "-", "outcome": "DONE", "preview_hash": "0f",
     "required": True, "rule": PruningRule(), "origin": (0.0, 0.0, 0.0), "direction": (1.0, 0.0, 0.0), "sequence": 1,
-    "u": 0.5, "v": 0.5, "along": 0.0, "wrong": True,
+    "u": 0.5, "v": 0.5, "along": 0.0, "wrong": True, "made_at": 5.0,
     "posture": "over the row", "angles": ControllerConfig().work.home,
 }  # fmt: skip
 
