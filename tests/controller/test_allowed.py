@@ -10,6 +10,7 @@ from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.commands import COMMAND_OF, INTENTS, POINT_STATES
+from rolling_panda.messages.perception import RobotCalibration
 from rolling_panda.messages.supervision import PreviewState
 from tests.controller.test_command_table import example as any_of
 from tests.support.controller_at_work import CONFIG, robot
@@ -28,6 +29,9 @@ VIEWS = {
 }
 SITE = m.UndecidedSite(vine=1, spur=2, reason=reasons.said("test"), needs="another look", position=(0.4, 0.8, 1.0))
 COMMANDS = tuple(kind for kind in INTENTS if COMMAND_OF[kind].tag != "control")
+
+
+WHEELS = m.BaseCalibration(left=0.133, right=0.133, track=0.51, made_at=5.0)
 
 
 class World:
@@ -127,6 +131,9 @@ class World:
                 return [kind(**common, posture=name) for name in free[:1]]
             case intents.DeletePosture:
                 return [kind(**common, posture=each.name) for each in state.postures if each.user]
+            case intents.UseBase:
+                self.robot.hear(RobotCalibration(header=m.Header(), base=WHEELS))
+                return [example(kind)]
             case _:
                 return [example(kind)]
 
