@@ -173,6 +173,17 @@ def test_on_a_slope_the_base_stands_still() -> None:
     assert np.abs(sim.true_base().pose - before).max() < 5e-4
 
 
+@pytest.mark.parametrize("seed", [*range(8), 26, 33, 102])
+def test_in_a_storm_the_robot_begins_at_rest_on_the_ground(seed: int) -> None:
+    # With the last three it once began with a wheel up to 37 mm below the ground, which threw it into the air.
+    sim = robot(STORM, seed=seed)
+    before = sim.true_base().pose
+    for _ in range(500):
+        sim.write(Setpoint(np.zeros(9), True, 1, 1, 0.0))
+    assert np.abs(sim.true_base().pose - before).max() < 0.002
+    assert np.degrees(np.arccos(sim.true_base_rotation()[2, 2])) < 12.0
+
+
 def test_a_turned_shifted_camera_with_another_lens_shows_the_row_elsewhere() -> None:
     row = grow(VineyardConfig(vines=1), 3)
     calm = Camera(LENS, 3).render(row, looking_left(0.5)).labels

@@ -42,6 +42,8 @@ from rolling_panda.reasons import text_of
 _DISPLAYED = frozenset({"post", "trunk", "cordon", "spur", "cane", "node", "wire", "hose", "old cut"})
 _WHEELS_ON_FLOOR = 3
 _SETTLING_STEPS = 200
+#: On uneven ground the robot settles at most so often, until no wheel is pressed deeper into the ground (m).
+_SETTLINGS, _PRESSED = 10, 0.001
 #: The ground under the wheels is laid anew when one has moved this far (m): the tangent plane is then off by 1 um.
 _LEVEL_EVERY = 0.001
 #: Only wood that begins this near to the blades can be between them (m).
@@ -324,8 +326,29 @@ class SimulatedRobot:
     def _settle(self) -> None:
         """Let the wheels settle under load, then move to the origin."""
         data, plant = self._data, self._plant
-        for _ in range(_SETTLING_STEPS * (5 if plant.ground else 1)):
-            self._advance(np.zeros(len(plant.xi_v)))
+        for _ in range(_SETTLINGS):
+            for _ in range(_SETTLING_STEPS * (5 if plant.ground else 1)):
+                self._advance(np.zeros(len(plant.xi_v)))
+            self._move_to_origin()
+            # The robot has rolled meanwhile, and the ground is another one at the origin.
+            depth = self._depth_in_ground() if plant.ground else 0.0
+            if depth < _PRESSED:
+                break
+            data.qpos[2] += depth
+        self._felt.restart()
+        if self._slip is not None:
+            self._slip.encoders = np.zeros(2)
+
+    def _depth_in_ground(self) -> float:
+        """How far the deepest wheel is below the ground (m)."""
+        self._level_ground()
+        mujoco.mj_forward(self._plant.model, self._data)
+        under = np.isin(self._data.contact.geom, self._planes).any(axis=1)
+        return -float(self._data.contact.dist[under].min(initial=0.0))
+
+    def _move_to_origin(self) -> None:
+        """To the origin of odom at heading 0, at rest, in the start posture; height, pitch and roll stay."""
+        data, plant = self._data, self._plant
         w, i, j, k = data.qpos[3:7]
         half = np.arctan2(2 * (w * k + i * j), 1 - 2 * (j * j + k * k)) / 2
         mujoco.mju_mulQuat(data.qpos[3:7], np.array([np.cos(half), 0.0, 0.0, -np.sin(half)]), np.array([w, i, j, k]))
@@ -334,9 +357,6 @@ class SimulatedRobot:
         data.qpos[plant.xi_q[:2]] = 0.0
         data.qpos[plant.xi_q[2:]] = self._start_arm
         mujoco.mj_forward(plant.model, data)
-        self._felt.restart()
-        if self._slip is not None:
-            self._slip.encoders = np.zeros(2)
 
     def _site(self, site: int) -> Array:
         T = np.eye(4)
