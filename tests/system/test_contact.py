@@ -93,14 +93,16 @@ def test_a_cane_is_pushed_aside_and_that_is_known() -> None:
     loop = ContactWorld((rod,), world=only(("cane_modulus",), "field"))
     loop.hold(joints=scaled(REACH, "cutter", 0.1))
     until_touched(loop)
-    strongest = 0.0
+    felt = []
     for _ in range(100):
         loop.run(0.01)
-        strongest = max(strongest, loop.controller.contact.force or 0.0)
+        felt.append((loop.controller.contact.force or 0.0, loop.touches[-1][1]))
     pushed = max(force for _, force, _ in loop.touches)
+    # Later the cane leans on several parts of the arm, and no one force at the tool explains the torques.
+    strongest, then = max(felt)
     assert loop.controller.mode == "TELEOP" and loop.touch is None
     assert 5.0 < pushed < 20.0
-    assert 0.4 * pushed < strongest < 1.3 * pushed
+    assert strongest > 3.0 and 0.4 * then < strongest < 1.3 * then
 
 
 def test_a_cane_that_is_touched_at_its_foot_stops_the_arm() -> None:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from msgspec.structs import replace
 
 from bridge.__main__ import with_usual_config
 from bridge.config import BridgeConfig
@@ -31,7 +32,16 @@ SECTIONS: list[tuple[str, type[msgspec.Struct]]] = [
 
 @pytest.mark.parametrize(("name", "kind"), SECTIONS)
 def test_what_no_device_changes_is_as_in_the_simulation(name: str, kind: type[msgspec.Struct]) -> None:
-    assert load_section(REAL, name, kind) == load_section(SIM, name, kind)
+    real, sim = load_section(REAL, name, kind), load_section(SIM, name, kind)
+    if isinstance(real, ControllerConfig):
+        # A robot that is new begins slower, in the canes and along the row.
+        assert real.motion.cut_speed < sim.motion.cut_speed and real.work.survey_speed < sim.work.survey_speed
+        sim = replace(
+            sim,
+            motion=replace(sim.motion, cut_speed=real.motion.cut_speed),
+            work=replace(sim.work, survey_speed=real.work.survey_speed),
+        )
+    assert real == sim
 
 
 def test_the_bridge_keeps_the_same_deadlines_and_the_devices_are_no_slower() -> None:

@@ -169,7 +169,7 @@ class Movement:
     def ramp(self):
         return MotionResult(self._saturation.ramp(self._setpoints.sent))
 
-    def step(self, mode, held, now):
+    def step(self, mode, held, now, waits=False):
         if mode == "PROTECTIVE_STOP" and self._back and held:
             self._back -= 1
             return MotionResult(-WHEELS)
@@ -179,7 +179,7 @@ class Movement:
         if mode == "TELEOP":
             return MotionResult(self.teleoperation.step(None).xi)
         if mode == "AUTO":
-            return self.sequence.step(self._setpoints.sent, now)
+            return self.ramp() if waits else self.sequence.step(self._setpoints.sent, now)
         self._home = max(0, self._home - 1)
         return MotionResult(WHEELS) if self._home else self.ramp()
 
