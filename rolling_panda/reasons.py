@@ -2827,7 +2827,7 @@ def gone_already() -> None:
     """Its cane is off already, as the close-up shows."""
 
 
-@_reason("warning", "accept it again if it is right")
+@_reason("warning", "")
 def changed_in_close_up(why: Reason) -> None:
     """In the close-up: {why}."""
 
