@@ -20,7 +20,7 @@ Blocker = Literal["", "cane", "wire", "post"]
 def blocked_by(row: Row, cut: RightCut) -> Blocker:
     """What leaves no room for the blades wherever the cut is made within its right stretch; empty where there is room.
 
-    Where several share the blame, it is what is in the way of the best place.
+    Where several things are in the way, it is the one in the way of the best place.
 
     Args:
         row: Before any cut.

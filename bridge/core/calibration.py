@@ -50,24 +50,23 @@ class WheelCalibration:
 
     def _take(self, base: m.BaseCalibration | None) -> None:
         self.base = base
-        sizes = self._drawn if base is None else WheelSizes(base.left, base.right, base.track)
-        self._to_drawn = np.asarray(np.linalg.solve(self._drawn.motion(), sizes.motion()), np.float64)
+        self._used = self._drawn if base is None else WheelSizes(base.left, base.right, base.track)
+        self._to_drawn = np.asarray(np.linalg.solve(self._drawn.motion(), self._used.motion()), np.float64)
         self._to_real = np.asarray(np.linalg.inv(self._to_drawn), np.float64)
 
     @property
     def sizes(self) -> tuple[float, float, float] | None:
         """Both radii and the track in use (m); None for those drawn."""
-        return None if self.base is None else (self.base.left, self.base.right, self.base.track)
+        return None if self.base is None else (self._used.left, self._used.right, self._used.track)
 
     def measured(self, measurement: Measurement) -> Measurement:
         """A measurement of the robot, with wheels as drawn. Their angles go on where they were."""
         real = measurement.position[:2].copy()
         if self._real is None:
             self._shown = real
-        elif self.base is not None:
-            self._shown = self._shown + self._to_drawn @ (real - self._real)
         else:
-            self._shown = self._shown + (real - self._real)
+            turned = real - self._real
+            self._shown = self._shown + (turned if self.base is None else self._to_drawn @ turned)
         self._real = real
         if self.base is None:
             return measurement
@@ -110,7 +109,7 @@ class WheelCalibration:
         if not at_rest:
             return None
         self._pending = None
-        before = self._drawn if self.base is None else WheelSizes(self.base.left, self.base.right, self.base.track)
+        before = self._used
         self._take(base)
         radius = (base.left + base.right) / (before.left + before.right)
         return reasons.base_calibration_used(100 * (radius - 1.0), 100 * (base.track / before.track - 1.0))

@@ -12,7 +12,7 @@ from controller.config import ControllerConfig
 from controller.motion.follower import UNNAMED, Follower, Measured, Tracking
 from controller.whole_body.saturation import Saturation
 from controller.work.close_up import CloseUpClient
-from controller.work.homing import Homing
+from controller.work.homing import Homing, go_home
 from controller.work.step_result import StepResult
 from controller.work.survey import wheels
 from rolling_panda import reasons
@@ -77,13 +77,10 @@ class BaseViews:
             now: Monotonic time (s).
         """
         if self._homing is not None:
-            xi = self._homing.step(robot)
-            if self._homing.blocked:
-                why = reasons.calibration_blocked(self._homing.blocked)
-                return StepResult(self._saturation.ramp(robot.sent), pause=why)
+            result = go_home(self._homing, robot, self._saturation, reasons.calibration_blocked)
             if self._homing.done:
                 self._homing = None
-            return StepResult(xi)
+            return result
         if self._start is None:
             x, y, heading = robot.q[:3].tolist()
             self._start = x, y, heading

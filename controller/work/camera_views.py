@@ -16,7 +16,7 @@ from controller.config import ControllerConfig
 from controller.motion.follower import UNNAMED, ArmMotion, Follower, Measured, MotionTimeout
 from controller.whole_body.saturation import Saturation
 from controller.work.close_up import CloseUpClient
-from controller.work.homing import Homing
+from controller.work.homing import Homing, go_home
 from controller.work.step_result import StepResult
 from rolling_panda import reasons
 from rolling_panda.messages.perception import CALIBRATION, CHECK
@@ -190,14 +190,12 @@ class CameraViews:
 
     def _home(self, robot: Measured, homing: Homing) -> StepResult:
         """To the survey posture, before the first picture and after the last."""
-        xi = homing.step(robot)
-        if homing.blocked:
-            return StepResult(self._saturation.ramp(robot.sent), pause=reasons.calibration_blocked(homing.blocked))
+        result = go_home(homing, robot, self._saturation, reasons.calibration_blocked)
         if homing.done:
             self._homing = None
             if not self._left:
                 return StepResult(self._saturation.ramp(robot.sent), finished=True, summary=self._summary())
-        return StepResult(xi)
+        return result
 
     def _move(self, robot: Measured, way: ArmMotion, now: float) -> StepResult:
         tracking = way.step(robot, self._follower, self._dt)

@@ -12,7 +12,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import pinocchio as pin
@@ -276,6 +276,13 @@ class CutTask:
     plan: CutPlan
 
 
+class Holds(Protocol):
+    """A motion whose timeouts can leave a period out."""
+
+    def hold(self) -> None:
+        """The robot stands for one period."""
+
+
 class Stage(ABC):
     """A stage of the sequence."""
 
@@ -286,9 +293,9 @@ class Stage(ABC):
     #: Point of the stage; empty without one.
     point_id = ""
 
-    def __init__(self, parts: Parts) -> None:
-        """Bind the parts."""
-        self._parts = parts
+    def __init__(self, parts: Parts, motion: Holds | None = None) -> None:
+        """Bind the parts, and the motion that the stage follows, if there is one."""
+        self._parts, self._motion = parts, motion
 
     @property
     def plan(self) -> CutPlan | None:
@@ -300,8 +307,10 @@ class Stage(ABC):
         """Plans of the cuts that the motion begins or ends at."""
         return ()
 
-    def hold(self) -> None:  # noqa: B027
+    def hold(self) -> None:
         """The robot stands in this period, in place of `step`. No timeout counts it."""
+        if self._motion is not None:
+            self._motion.hold()
 
     @abstractmethod
     def step(self, robot: Measured, now: float) -> "Step":
@@ -379,12 +388,8 @@ class Escaping(Stage):
 
     def __init__(self, parts: Parts, way: FollowedMotion) -> None:
         """Along `way`."""
-        super().__init__(parts)
+        super().__init__(parts, way)
         self._way = way
-
-    def hold(self) -> None:
-        """Stand for one period."""
-        self._way.hold()
 
     def step(self, robot: Measured, now: float) -> Step:
         """One period."""
@@ -428,9 +433,9 @@ class Search(Stage):
 class TaskStage(Stage):
     """A stage of a cut under way."""
 
-    def __init__(self, parts: Parts, task: CutTask) -> None:
+    def __init__(self, parts: Parts, task: CutTask, motion: Holds | None = None) -> None:
         """For one cut."""
-        super().__init__(parts)
+        super().__init__(parts, motion)
         self._task, self.point_id = task, task.point_id
 
     @property
@@ -449,12 +454,8 @@ class MovingStage(TaskStage):
 
     def __init__(self, parts: Parts, task: CutTask, way: FollowedMotion) -> None:
         """For one cut, along `way`."""
-        super().__init__(parts, task)
+        super().__init__(parts, task, way)
         self._way = way
-
-    def hold(self) -> None:
-        """Stand for one period."""
-        self._way.hold()
 
     def _retreat(self, robot: Measured) -> "Retreat":
         """Straight out of the canes, and on to the next cut where one is found."""
@@ -620,12 +621,8 @@ class Retreat(LeavingStage):
 
     def __init__(self, parts: Parts, task: CutTask, way: FollowedMotion) -> None:
         """From one cut, along `way`."""
-        super().__init__(parts, task)
+        super().__init__(parts, task, way)
         self._way = way
-
-    def hold(self) -> None:
-        """Stand for one period."""
-        self._way.hold()
 
     def step(self, robot: Measured, now: float) -> Step:
         """One period."""
@@ -651,12 +648,8 @@ class Withdraw(LeavingStage):
 
     def __init__(self, parts: Parts, task: CutTask, withdrawal: Withdrawal) -> None:
         """From one cut."""
-        super().__init__(parts, task)
+        super().__init__(parts, task, withdrawal)
         self._withdrawal = withdrawal
-
-    def hold(self) -> None:
-        """Stand for one period."""
-        self._withdrawal.hold()
 
     def step(self, robot: Measured, now: float) -> Step:
         """One period."""
@@ -676,12 +669,8 @@ class Surveying(Stage):
 
     def __init__(self, parts: Parts, survey: Survey) -> None:
         """With one survey."""
-        super().__init__(parts)
+        super().__init__(parts, survey)
         self._survey = survey
-
-    def hold(self) -> None:
-        """Stand for one period."""
-        self._survey.hold()
 
     def step(self, robot: Measured, now: float) -> Step:
         """One period."""
@@ -697,12 +686,8 @@ class Calibrating(Stage):
 
     def __init__(self, parts: Parts, views: CameraViews | BaseViews) -> None:
         """With one round of pictures."""
-        super().__init__(parts)
+        super().__init__(parts, views)
         self._views = views
-
-    def hold(self) -> None:
-        """Stand for one period."""
-        self._views.hold()
 
     def step(self, robot: Measured, now: float) -> Step:
         """One period."""

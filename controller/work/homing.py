@@ -1,13 +1,17 @@
 """Motions of the arm out of the canes and to a survey posture, with the base at rest."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
 from controller.config import ControllerConfig
 from controller.motion.follower import UNNAMED, ArmMotion, Follower, Measured, MotionTimeout, Tracking
 from controller.motion.tool_motion import Leg, ToolMotion
+from controller.whole_body.saturation import Saturation
 from controller.work.posture_search import escape_pose
+from controller.work.step_result import StepResult
+from rolling_panda.messages.types import Reason
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import ARM_Q
 
@@ -61,6 +65,14 @@ class Homing:
         self._held_s = self._held_s + self._dt if held else 0.0
         if self._held_s > _PATIENCE_S:
             self.blocked = tracking.reason or UNNAMED
+
+
+def go_home(homing: Homing, robot: Measured, saturation: Saturation, blocked: Callable[[str], Reason]) -> StepResult:
+    """One period of a homing motion within automatic work; where the arm is blocked, work pauses with the reason."""
+    xi = homing.step(robot)
+    if homing.blocked:
+        return StepResult(saturation.ramp(robot.sent), pause=blocked(homing.blocked))
+    return StepResult(xi)
 
 
 class Withdrawal:

@@ -12,7 +12,7 @@ import numpy as np
 from controller.config import ControllerConfig
 from controller.motion.follower import UNNAMED, Follower, Measured, Tracking
 from controller.whole_body.saturation import Saturation
-from controller.work.homing import Homing
+from controller.work.homing import Homing, go_home
 from controller.work.point_queue import PointQueue
 from controller.work.step_result import StepResult
 from rolling_panda import messages as m
@@ -77,12 +77,10 @@ class Survey:
             now: Monotonic time (s).
         """
         if self._homing is not None:
-            xi = self._homing.step(robot)
-            if self._homing.blocked:
-                return StepResult(self._saturation.ramp(robot.sent), pause=reasons.survey_blocked(self._homing.blocked))
+            result = go_home(self._homing, robot, self._saturation, reasons.survey_blocked)
             if self._homing.done:
                 self._homing = None
-            return StepResult(xi)
+            return result
         x, aside = float(robot.q[:2] @ self._along), float(robot.q[:2] @ self._left)
         if self._line is None:
             self._line = x, aside

@@ -209,7 +209,7 @@ class _Problem:
         return np.concatenate([np.zeros(_COMMON), self.odometry[1:].ravel()])
 
     def residuals(self, x: Array) -> Array:
-        """Over their standard deviations: three of each leg, six of each picture, seven of what is known before."""
+        """Residuals in standard deviations: three for each leg, six for each picture, seven for the prior."""
         poses = self._poses(x)
         T_camera_base = (self.T_base_camera * pin.exp6(x[3:9])).inverse()
         T_odom_board = self.T_odom_board * pin.exp6(x[9:15])

@@ -109,9 +109,13 @@ class _Fit:
 class RowLocaliser:
     """Estimates the pose of the base in the map. It has no clock: the same sightings give the same estimates."""
 
-    def __init__(self) -> None:
-        """In an unknown row, at the origin of the map, which is then that of odom."""
-        self._map = RowMap()
+    def __init__(self, row_map: RowMap | None = None) -> None:
+        """At the origin of the map, which is then that of odom.
+
+        Args:
+            row_map: Wood that is known already; None in an unknown row.
+        """
+        self._map = RowMap() if row_map is None else row_map
         #: x, y, z, rotations about x and y of the map, heading.
         self._pose: Array = np.zeros(6)
         self._covariance: Array = np.diag([1e-6, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6])

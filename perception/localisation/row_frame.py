@@ -1,4 +1,4 @@
-"""The frame `map` of perception: everything seen is kept in it, and told in `odom`, which drifts against it.
+"""The frame `map` of perception: positions are stored in it and published in `odom`, which drifts against it.
 
 The transform in use differs from the newest estimate by less than the estimate can tell. It stays the identity until
 the odometry is wrong by more than `_DEPARTS`, so that a robot with good odometry has the same results as without.
@@ -43,7 +43,7 @@ Lines = tuple[tuple[Vector3, ...], ...]
 
 
 class RowFrame:
-    """Map and odom: the transform between them in use, and what it does to what is seen and told."""
+    """The transform from odom to map: it converts frames into map, and points, canes and obstacles into odom."""
 
     def __init__(self, on: bool) -> None:
         """At the origin of both; off, they stay one."""

@@ -69,22 +69,10 @@ def _write_board(out: Path) -> int:
 
 def _calibrate_camera(arguments: argparse.Namespace) -> int:
     with _Page(arguments.page, arguments.user) as page:
-        before = page.get("camera")
-        print(f"In use: {_told(before['mount'])}")
-        if not arguments.yes and not _agreed(
-            "Is the board 45 cm before the camera in its survey posture, and nobody near the arm? It will move."
-        ):
-            return 1
-        if page.mode() == "IDLE":
-            page.post("arm")
-        page.post("camera/calibrate")
-        mode = page.watch(lambda: int(page.get("camera")["views"]))
-        print(f"\n{page.newest_event()}")
-        result = page.get("camera")
-        offer = result["offer"]
-        if mode != "READY" or offer is None:
-            print(f"No calibration: {page.words(result['refused'])}" if result["refused"] else "No calibration.")
-            print("The calibration in use stays as it is.")
+        print(f"In use: {_told(page.get('camera')['mount'])}")
+        question = "Is the board 45 cm before the camera in its survey posture, and nobody near the arm? It will move."
+        offer = _measured(page, arguments.yes, question, "camera", ("camera", "views", "offer", "refused"))
+        if offer is None:
             return 1
         print(f"New:    {_told(offer)}")
         if not arguments.yes and not _agreed("Use it? All points are then looked for anew."):
@@ -97,22 +85,13 @@ def _calibrate_base(arguments: argparse.Namespace) -> int:
     with _Page(arguments.page, arguments.user) as page:
         used = page.get("state")["bridge"]
         print(f"In use: {_wheels_told(None if used is None else used['base'])}")
-        if not arguments.yes and not _agreed(
+        question = (
             "Is the board 45 cm before the camera in its survey posture, the ground firm, and half a metre free before "
             "and behind the base? It will drive and turn."
-        ):
-            return 1
-        if page.mode() == "IDLE":
-            page.post("arm")
-        page.post("base/calibrate")
-        mode = page.watch(lambda: int(page.get("calibration")["base_views"]))
-        print(f"\n{page.newest_event()}")
-        result = page.get("calibration")
-        offer = result["base"]
-        if mode != "READY" or offer is None:
-            refused = result["base_refused"]
-            print(f"No calibration: {page.words(refused)}" if refused else "No calibration.")
-            print("The calibration in use stays as it is.")
+        )
+        names = "calibration", "base_views", "base", "base_refused"
+        offer = _measured(page, arguments.yes, question, "base", names)
+        if offer is None:
             return 1
         print(f"New:    {_wheels_told(offer)}")
         if not arguments.yes and not _agreed("Use it?"):
@@ -123,6 +102,35 @@ def _calibrate_base(arguments: argparse.Namespace) -> int:
             return 1
         print("It is in use.")
     return 0
+
+
+def _measured(
+    page: "_Page", yes: bool, question: str, what: str, names: tuple[str, str, str, str]
+) -> dict[str, Any] | None:
+    """Let the robot calibrate `what`; returns the calibration that it offers, None without one.
+
+    Args:
+        page: Session with the server.
+        yes: Whether nothing is asked.
+        question: Asked before anything moves.
+        what: Calibrated part: `camera` or `base`.
+        names: Path of the state, and in it the number of views, the offer and why there is none.
+    """
+    path, views, offered, refused = names
+    if not yes and not _agreed(question):
+        return None
+    if page.mode() == "IDLE":
+        page.post("arm")
+    page.post(f"{what}/calibrate")
+    mode = page.watch(lambda: int(page.get(path)[views]))
+    print(f"\n{page.newest_event()}")
+    result = page.get(path)
+    offer: dict[str, Any] | None = result[offered]
+    if mode == "READY" and offer is not None:
+        return offer
+    print(f"No calibration: {page.words(result[refused])}" if result[refused] else "No calibration.")
+    print("The calibration in use stays as it is.")
+    return None
 
 
 def _wheels_told(base: dict[str, Any] | None) -> str:

@@ -69,7 +69,7 @@ class VelocityServos:
             torque: Bound (n, N·m), on top of what compensates gravity.
             dt: Step (s).
             hold_s: Time in which a joint takes up a lasting load, such as a slope, without a difference in speed
-                (n, s); infinite for one that gives way to it; None for none that does not.
+                (n, s); infinite for one that gives way to it. None: all of them give way.
         """
         self._hold = np.zeros_like(lag_s) if hold_s is None else dt / hold_s
         self._held = np.zeros_like(lag_s)
