@@ -5,6 +5,7 @@ import functools
 
 import msgspec
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -12,9 +13,11 @@ from bridge.sim.camera.config import CameraConfig
 from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
+from perception.arrays import distance
 from perception.config import SkeletonConfig
 from perception.segmentation.depth_inpainting import inpaint_depth, interpolate_lost_depth
 from perception.segmentation.frame import View
+from perception.skeleton.topology import perceive_plant, trace_canes
 from rolling_panda import messages as m
 
 CANE = m.WOOD_CLASSES.index("cane")
@@ -80,6 +83,29 @@ def test_depth_that_is_lost_on_a_stretch_is_interpolated_along_the_wood():
 def test_wood_beyond_the_range_takes_no_depth_from_what_is_before_it():
     behind = strip(np.concatenate([np.full(20, 0.7), np.full(20, 2.0)]))
     assert (behind[24:] == np.float32(2.0)).all()
+    between = strip(np.concatenate([np.full(20, 0.7), np.zeros(6), np.full(20, 2.0)]))
+    assert between[20:26] == pytest.approx(0.7, abs=1e-4), "lost depth is not a mixture of both rows"
+
+
+def test_a_stretch_without_depth_is_followed_by_a_survey_and_counts_as_hidden():
+    view = seen_without_errors()
+    whole = perceive_plant(view, view.labels, SkeletonConfig())
+    spur, cane = max(((s, c) for s in whole.spurs for c in s.canes), key=lambda each: each[1].length)
+    at = int(np.argmin(np.abs(cane.arc - 0.12)))
+    u, v, _ = view.pixels(cane.axis[at : at + 1])[0]
+    lost = view.depth.copy()
+    lost[round(v) - 8 : round(v) + 8, round(u) - 15 : round(u) + 15] = 0.0
+    holed = dataclasses.replace(view, depth=lost)
+    seen = min(
+        perceive_plant(holed, view.labels, SkeletonConfig()).spurs, key=lambda s: distance(s.position, spur.position)
+    )
+    same = max(seen.canes, key=lambda c: c.length)
+    assert same.length == pytest.approx(cane.length, abs=0.02)
+    assert any(span.start < 0.12 < span.end for span in same.hidden)
+    assert not any(span.start < 0.12 < span.end for span in cane.hidden)
+    # A close-up decides on what it has seen: it does not follow the cane through the hole.
+    pieces, canes = (trace_canes(each, view.labels, SkeletonConfig()) for each in (holed, view))
+    assert len(pieces) > len(canes)
 
 
 @given(lost=st.lists(st.booleans(), min_size=60, max_size=60), near=st.floats(0.3, 1.0), far=st.floats(0.3, 1.0))
