@@ -413,7 +413,7 @@ class Controller:
         measured = movement.body.measured
         return self._plans.review(
             made=None if made is None else made.message,
-            q=None if measured is None else movement.sequence.clear_of_canes(measured.q),
+            q=None if measured is None else measured.in_map(movement.sequence.clear_of_canes(measured.q)),
             obstacles=() if obstacles is None else obstacles.message.capsules,
             at_rest=not movement.homing and self.mode != "TELEOP" and movement.at_rest,
             working=self.mode == "AUTO",
@@ -433,7 +433,7 @@ class Controller:
         measured = movement.body.measured
         return self._previews.review(
             made=None if made is None else made.message,
-            q=None if measured is None else measured.q,
+            q=None if measured is None else measured.in_map(measured.q),
             obstacles=() if obstacles is None else obstacles.message.capsules,
             cuts=self._plans.cuts,
             at_rest=not movement.homing and self.mode != "TELEOP" and movement.at_rest,

@@ -294,19 +294,19 @@ class Perception:
         sites = [SpurNumber(site.vine, site.spur) for site in self._site_messages if site.vine > 0]
         self.pictures = self._spur_pictures.update(points, sites, self.plant_map)
         return m.PruningPoints(
-            header=m.Header(self._stamp, "odom"),
+            header=m.Header(self._stamp, "map"),
             segmenter=self.segmenter.name,
             frames=self._frames,
-            points=self.row_frame.points_in_odom(self._with_distances(points)),
-            undecided_sites=self.row_frame.sites_in_odom(self._site_messages),
-            canes=self.row_frame.lines_in_odom(self._cane_lines),
+            points=self._with_distances(points),
+            undecided_sites=self._site_messages,
+            canes=self._cane_lines,
             rule=_rule_message(self._config.rule),
         )
 
     @property
     def obstacles(self) -> tuple[Capsule, ...]:
-        """Obstacle map with the retained canes, in odom; the same object while there is no news."""
-        return self.row_frame.capsules_in_odom(self._wood)
+        """Obstacle map with the retained canes, in map; the same object while there is no news."""
+        return self._wood
 
     @property
     def localisation(self) -> Localisation:
@@ -347,7 +347,7 @@ class Perception:
 
     def _add(self, request: AddPoint) -> m.Answer:
         ray = Ray(np.array(request.origin), np.array(request.direction))
-        return self._place(self.row_frame.ray_in_map(ray), request.user)
+        return self._place(ray, request.user)
 
     def _add_in_image(self, request: AddPointInImage) -> m.Answer:
         at = request.sequence, request.u, request.v

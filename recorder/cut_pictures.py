@@ -7,8 +7,10 @@ import msgspec
 from recorder.recording import Recording
 from rolling_panda import topics
 from rolling_panda.cut_pictures import CloseUps, CutCloseUp, PictureFolder, box_of, cropped
+from rolling_panda.messages.perception import Localisation
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.messages.types import Vector3
+from rolling_panda.model.map_frame import MapFrame
 from rolling_panda.model.robot import RobotModel
 
 #: The largest number of pictures of a recording.
@@ -59,6 +61,10 @@ def _close_ups(recording: Recording) -> list[CutCloseUp]:
             before, queue = queue, each.decoded(_Queue).queue
             if queue != before:
                 new += close_ups.update(queue)
+        elif each.topic is topics.LOCALISATION:
+            told = each.message()
+            if isinstance(told, Localisation):
+                close_ups.where = MapFrame.told(told)
         elif each.topic is topics.CAMERA and _NO_POINT not in each.data:
             frame = each.message()
             if isinstance(frame, CameraFrame) and frame.point_id:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rolling_panda import messages as m
+from rolling_panda.messages.perception import Localisation
 from rolling_panda.messages.robot import CameraFrame
 
 _VECTOR = {"type": "object", "properties": {name: {"type": "number"} for name in "xyz"}}
@@ -48,6 +49,17 @@ def _base_transform(message: m.Odometry, stamp_ns: int) -> dict[str, Any]:
     }
 
 
+def _map_transform(message: Localisation, stamp_ns: int) -> dict[str, Any]:
+    pose = message.T_map_odom
+    return {
+        "timestamp": _time(stamp_ns),
+        "parent_frame_id": "map",
+        "child_frame_id": "odom",
+        "translation": dict(zip("xyz", pose.position, strict=True)),
+        "rotation": dict(zip("xyzw", pose.quat_xyzw, strict=True)),
+    }
+
+
 def _tool_pose(message: m.ControllerState, stamp_ns: int) -> dict[str, Any] | None:
     pose = message.T_odom_tool
     if pose is None:
@@ -64,20 +76,17 @@ def _image(message: CameraFrame, stamp_ns: int) -> dict[str, Any]:
     return {"timestamp": _time(stamp_ns), "frame_id": "camera", "data": data, "format": "jpeg"}
 
 
+_TRANSFORM: dict[str, Any] = {
+    "timestamp": _TIME,
+    "parent_frame_id": _TEXT,
+    "child_frame_id": _TEXT,
+    "translation": _VECTOR,
+    "rotation": _QUATERNION,
+}
 #: By message type.
 CHANNELS: dict[type[m.Message], FoxgloveChannel] = {
-    m.Odometry: FoxgloveChannel(
-        "tf",
-        "foxglove.FrameTransform",
-        {
-            "timestamp": _TIME,
-            "parent_frame_id": _TEXT,
-            "child_frame_id": _TEXT,
-            "translation": _VECTOR,
-            "rotation": _QUATERNION,
-        },
-        _base_transform,
-    ),
+    m.Odometry: FoxgloveChannel("tf", "foxglove.FrameTransform", _TRANSFORM, _base_transform),
+    Localisation: FoxgloveChannel("tf_map", "foxglove.FrameTransform", _TRANSFORM, _map_transform),
     m.ControllerState: FoxgloveChannel(
         "tool",
         "foxglove.PoseInFrame",

@@ -95,8 +95,8 @@ class AddPoint(PlantRequest, frozen=True, kw_only=True):
     """Add a point on the known cane nearest to a ray, as from a click in the 3-D view.
 
     Attributes:
-        origin: Origin of the ray in odom (m).
-        direction: Unit direction of the ray in odom.
+        origin: Origin of the ray in map (m).
+        direction: Unit direction of the ray in map.
     """
 
     origin: Vector3

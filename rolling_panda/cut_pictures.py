@@ -13,6 +13,7 @@ from PIL import Image
 
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.messages.types import Vector3
+from rolling_panda.model.map_frame import MapFrame
 from rolling_panda.model.robot import RobotModel, configuration
 
 Moment = Literal["before", "after"]
@@ -46,17 +47,18 @@ class Entry(Protocol):
 
     @property
     def accepted_position(self) -> Vector3 | None:
-        """Position at acceptance, in odom (m)."""
+        """Position at acceptance, in map (m)."""
 
 
 @dataclass(frozen=True)
 class CutCloseUp:
-    """A close-up of a cut, and where in odom the cut is (m)."""
+    """A close-up of a cut, where in map the cut is (m), and where odom was in map."""
 
     cut_id: str
     moment: Moment
     frame: CameraFrame
     position: Vector3
+    where: MapFrame = MapFrame()
 
 
 class CloseUps:
@@ -64,7 +66,9 @@ class CloseUps:
 
     def __init__(self) -> None:
         """Nothing was seen."""
-        self._newest: OrderedDict[str, CameraFrame] = OrderedDict()
+        #: Where odom is in map when a close-up is added.
+        self.where = MapFrame()
+        self._newest: OrderedDict[str, tuple[CameraFrame, MapFrame]] = OrderedDict()
         self._cut_ids: dict[str, str] = {}
         self._cut: dict[str, Entry] = {}
 
@@ -72,8 +76,8 @@ class CloseUps:
         """Take in a close-up. Returns it if it shows a cut after the order to cut; a newer one takes its place."""
         entry = self._cut.get(frame.point_id)
         if entry is not None and entry.accepted_position is not None:
-            return CutCloseUp(entry.cut_id, "after", frame, entry.accepted_position)
-        self._newest[frame.point_id] = frame
+            return CutCloseUp(entry.cut_id, "after", frame, entry.accepted_position, self.where)
+        self._newest[frame.point_id] = frame, self.where
         self._newest.move_to_end(frame.point_id)
         if len(self._newest) > _MOST_POINTS:
             self._newest.popitem(last=False)
@@ -86,9 +90,10 @@ class CloseUps:
         for point_id, entry in self._cut.items():
             if self._cut_ids.get(point_id) != entry.cut_id:
                 self._cut_ids[point_id] = entry.cut_id
-                frame = self._newest.pop(point_id, None)
-                if frame is not None and entry.accepted_position is not None:
-                    begun.append(CutCloseUp(entry.cut_id, "before", frame, entry.accepted_position))
+                newest = self._newest.pop(point_id, None)
+                if newest is not None and entry.accepted_position is not None:
+                    frame, where = newest
+                    begun.append(CutCloseUp(entry.cut_id, "before", frame, entry.accepted_position, where))
         return begun
 
 
@@ -101,7 +106,7 @@ def box_of(close_up: CutCloseUp, model: RobotModel) -> Box | None:
     The cut is in the middle, so that a part of the picture may lie outside the frame.
     """
     frame, k = close_up.frame, model.lens(close_up.frame.intrinsics)
-    camera = model.pose(configuration(frame.base, frame.position), model.camera_id)
+    camera = close_up.where.pose_in_map(model.pose(configuration(frame.base, frame.position), model.camera_id))
     x, y, z = (np.array(close_up.position) - camera.translation) @ camera.rotation
     if z < _NEAREST:
         return None

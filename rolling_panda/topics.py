@@ -197,7 +197,7 @@ CAMERA_STATE = Topic(
     "calibration of the camera, and the monitor's estimate of its error; also at once on change", latched=True,
 )
 LOCALISATION = Topic(
-    "perception/localisation", perception.Localisation, "perception", "controller", 1, "DATA_LOW", "DROP",
+    "perception/localisation", perception.Localisation, "perception", "controller, server", 1, "DATA_LOW", "DROP",
     "odom in map with its covariance, and whether the robot is lost; also at once on change", latched=True,
 )
 ROBOT_CALIBRATION = Topic(

@@ -75,7 +75,7 @@ class Loop:
         robot, controller = self._robot, self._robot.link.controller.peek()
         # A replay has the pictures of its recording.
         if controller is not None and robot.link.replay.peek() is None:
-            await robot.pictures.step(controller.message.queue)
+            await robot.pictures.step(controller.message.queue, robot.link.map_frame)
 
     async def _update_log(self, now: float) -> None:
         robot = self._robot

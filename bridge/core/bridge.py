@@ -455,4 +455,4 @@ class BridgeCore:
         if revision == self._scenery_revision:
             return None
         self._scenery_revision = revision
-        return Scenery(header=m.Header(now, "odom"), revision=revision, capsules=capsules)
+        return Scenery(header=m.Header(now, "map"), revision=revision, capsules=capsules)

@@ -2,6 +2,7 @@
 
 import math
 from collections import deque
+from contextlib import suppress
 
 import numpy as np
 
@@ -19,12 +20,14 @@ from controller.whole_body.two_rates import TwoRates
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.config import RobotConfig
-from rolling_panda.messages.perception import Obstacles
+from rolling_panda.errors import ModelError
+from rolling_panda.messages.perception import Localisation, Obstacles
 from rolling_panda.messages.robot import JointState, Odometry
 from rolling_panda.model.differential_drive import NXI, Array, DifferentialDrive, Pose
+from rolling_panda.model.map_frame import MapFrame
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.model.wire_values import actuated
-from rolling_panda.transport.inbox import Inbox
+from rolling_panda.transport.inbox import Inbox, Received
 
 #: Longest extrapolation of odometry (s); older odometry is a fault.
 _LONGEST = 0.1
@@ -153,9 +156,16 @@ class Body:
         #: Way of the last seconds, oldest first: positions of ξ (9) and of the tool (3, m, odom).
         self.trail: deque[tuple[Array, Array]] = deque(maxlen=_TRAIL)
         self.measured: Measured | None = None
+        #: Where odom is in map, as told last.
+        self.frame = MapFrame()
+        self._localisation: Localisation | None = None
+        #: Obstacles in odom.
+        self.obstacles: Received[Obstacles] | None = None
+        self._told: tuple[Received[Obstacles] | None, MapFrame] = None, self.frame
 
     def update(self, inbox: Inbox) -> None:
         """Update state and obstacles from what has arrived."""
+        self._locate(inbox)
         joints, odometry = inbox.newest(JointState), inbox.newest(Odometry)
         if joints is not None:
             self.tracking_error.update(joints.message, self.setpoints.sent)
@@ -166,14 +176,30 @@ class Body:
             ahead = self._config.motion.arm_lag_s + 0.5 * self.dt
             measured = np.array(joints.message.velocity[:2])
             wheels = wheels_ahead(measured, sent[:2], ahead, self._config.motion.base_lag_s)
-            self.measured = Measured(q, self.robot.kinematics(q), sent)
+            self.measured = Measured(q, self.robot.kinematics(q), sent, self.frame)
             self._method.start_period(sent, self.setpoints.before, wheels)
             around = self.surroundings.model.obstacles
             moves = not self.setpoints.at_rest
             self.contact.update(joints.message, q, self.measured.kinematics, moves, around)
             if moves:
                 self.trail.append((q[3:], self.measured.kinematics.T_odom_tool.translation))
-        self.surroundings.update(inbox.newest(Obstacles))
+        self.surroundings.update(self.obstacles)
+
+    def _locate(self, inbox: Inbox) -> None:
+        """Take in where odom is in map, and the obstacles in odom."""
+        told, around = inbox.newest(Localisation), inbox.newest(Obstacles)
+        if told is not None and told.message is not self._localisation:
+            before, self._localisation = self._localisation, told.message
+            if before is None or before.T_map_odom != told.message.T_map_odom:
+                # A transform that is none changes nothing.
+                with suppress(ModelError):
+                    self.frame = MapFrame.told(told.message)
+        if self._told != (around, self.frame):
+            self._told, self.obstacles = (around, self.frame), around
+            if around is not None and self.frame.T_map_odom is not None:
+                capsules = self.frame.capsules_in_odom(around.message.capsules)
+                in_odom = Obstacles(header=m.Header(around.message.header.stamp, "odom"), capsules=capsules)
+                self.obstacles = Received(in_odom, around.at)
 
 
 #: Largest tracking error of wheels and joints (rad). In motion at full speed the servos'

@@ -14,6 +14,7 @@ from controller.whole_body.task import ActuatorTask, BaseMode, IkProblem, Method
 from rolling_panda import reasons
 from rolling_panda.messages.types import Reason
 from rolling_panda.model.differential_drive import NXI, Array
+from rolling_panda.model.map_frame import MapFrame
 from rolling_panda.model.robot import ARM_Q, ARM_XI, Kinematics
 
 
@@ -21,14 +22,20 @@ class Measured(Struct, frozen=True):
     """State of the robot in one control period.
 
     Attributes:
-        q: Configuration (12).
+        q: Configuration (12), with the base in odom.
         kinematics: Kinematics of the tool at q.
         sent: Last command ξ̇ (9, rad/s).
+        frame: Where odom is in map.
     """
 
     q: Array
     kinematics: Kinematics
     sent: Array
+    frame: MapFrame = MapFrame()
+
+    def in_map(self, q: Array) -> Array:
+        """A configuration (12) with the base in map of one in odom."""
+        return self.frame.configuration_in_map(q)
 
 
 class Tracking(Struct, frozen=True):

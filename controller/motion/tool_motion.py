@@ -214,17 +214,19 @@ class Correction:
     Attributes:
         begin: Start on the motion's clock (s).
         duration: Duration (s).
-        by: Displacement (3, m, odom).
+        by: Displacement of the tool (3, m, odom).
+        base: Displacement of the base (2, m, odom).
     """
 
     begin: float
     duration: float
     by: Array
+    base: Array
 
     @classmethod
-    def within(cls, begin: float, by: Array, rates: Rates) -> "Correction":
+    def within(cls, begin: float, by: Array, base: Array, rates: Rates) -> "Correction":
         """The shortest one within bounds of the tool's velocity, acceleration and jerk."""
-        return cls(begin, max(rates.duration(float(np.linalg.norm(by))), 1e-3), by)
+        return cls(begin, max(rates.duration(float(np.linalg.norm(by))), 1e-3), by, base)
 
     @property
     def end(self) -> float:
@@ -238,6 +240,8 @@ class Correction:
 
 #: Assumed limits of the arm's joints for a segment (rad/s, rad/s², rad/s³).
 _ARM = Rates(1.3, 4.0, 60.0)
+#: A displacement of the base (2, m) that is none.
+_STAYS: Array = np.zeros(2)
 #: Tolerance of the base's duration (s).
 _ROOM_S = 0.02
 
@@ -356,7 +360,7 @@ class ToolMotion:
             leg: Its end is the new goal. The last `slow_zone` is slow.
         """
         config, last = self._config, self._legs[-1]
-        made = _placed(config, last.leg.goal, last.leg.q_goal, [leg], self._flows, None, 0.0)[0]
+        made = _placed(config, self.goal, last.leg.q_goal, [leg], self._flows, None, 0.0)[0]
         begin = last.end
         if self._flows:
             begin -= config.blend * min(last.trajectory.duration, made.trajectory.duration)
@@ -368,13 +372,21 @@ class ToolMotion:
         self._goal_place, self._slow_end = leg.goal.translation.tolist(), True
         self.legs, self.duration = len(self._legs), max(self.duration, made.end)
 
-    def shift(self, by: Array) -> None:
-        """Move the goal by (3, m, odom) from now on, without a jump of velocity or acceleration."""
+    def shift(self, by: Array, base: Array = _STAYS) -> None:
+        """Move the goal from now on, without a jump of velocity or acceleration.
+
+        Args:
+            by: Displacement of the tool's goal (3, m, odom).
+            base: Displacement of the base's goal (2, m, odom), where the base moves.
+        """
         config = self._config
         # At the speed of the last part, so that a late correction does not accelerate the blades.
-        made = Correction.within(self.time, by, Rates(config.cut_speed, config.tool_acceleration, config.tool_jerk))
+        rates = Rates(config.cut_speed, config.tool_acceleration, config.tool_jerk)
+        made = Correction.within(self.time, by, base, rates)
         self._corrections.append(made)
         self.goal = pin.SE3(self.goal.rotation, self.goal.translation + by)
+        self.q_goal = self.q_goal.copy()
+        self.q_goal[:2] += base
         self.duration = max(self.duration, made.end)
 
     def settle(self, q: Array) -> None:
@@ -418,6 +430,8 @@ class ToolMotion:
             progress = quintic(self.time - self._free[0], self._free[1] - self._free[0])
             q[:2] = self._q_start[:2] + self._base_span * progress.s
             rate[:2] = self._base_span * progress.rate
+            for made in self._corrections:
+                _go_along(made.base, (done := made.progress(self.time)).s, done.rate, q, rate)
         q[2], rate[2] = self.q_goal[2], 0.0
         return Posture(q, rate, self.q_goal)
 
@@ -432,7 +446,7 @@ class ToolMotion:
 
 @compiled(NOTHING(VECTOR, NUMBER, NUMBER, VECTOR, VECTOR))
 def _go_along(span: Array, s: float, rate: float, q: Array, q_rate: Array) -> None:
-    """Add s · span to q and rate · span to its rate (12 each)."""
+    """Add s · span to the first of q and rate · span to its rate (12 each)."""
     for i in range(len(span)):
         q[i] += s * span[i]
         q_rate[i] += rate * span[i]

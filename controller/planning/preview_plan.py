@@ -103,7 +103,7 @@ def state_message(
         left: Number of accepted points that are not part of it.
         now: Monotonic time (s).
     """
-    header = m.Header(now, "odom")
+    header = m.Header(now, "map")
     if preview is None:
         return PreviewState(header=header, required=required, phase=phase, reason=reason)
     q = preview.request.q
@@ -124,7 +124,7 @@ def state_message(
 
 def motion_message(preview: Preview, now: float) -> PreviewMotion:
     """The message of the motion."""
-    return PreviewMotion(header=m.Header(now, "odom"), preview_hash=preview.digest, rows=preview.rows)
+    return PreviewMotion(header=m.Header(now, "map"), preview_hash=preview.digest, rows=preview.rows)
 
 
 def sweep(model: CollisionModel, times: Sequence[float], configurations: Sequence[Array]) -> SweptVolume:

@@ -83,7 +83,7 @@ class _Run:
         )
         self._log = CutLog(robot, self._movement.body.surroundings.model, self._queue)
         self._inbox = Inbox()
-        self._inbox.put(Obstacles(header=m.Header(0.0, "odom"), capsules=request.obstacles), 0.0)
+        self._inbox.put(Obstacles(header=m.Header(0.0, "map"), capsules=request.obstacles), 0.0)
         self._asked: set[int] = set()
         self._pending: deque[tuple[float, CloseUpResult]] = deque()
         self._closing: tuple[str, str, float] | None = None

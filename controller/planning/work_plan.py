@@ -83,7 +83,7 @@ def session_plan(plan: WorkPlan | None, state: PlanState, reason: m.Reason | Non
         reason: Why not.
         now: Monotonic time (s).
     """
-    header = m.Header(now, "odom")
+    header = m.Header(now, "map")
     if plan is None:
         return SessionPlan(header=header, state=state, reason=reason)
     return SessionPlan(

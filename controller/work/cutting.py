@@ -11,7 +11,8 @@ of this one.
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -34,6 +35,7 @@ from rolling_panda import reasons
 from rolling_panda.messages.perception import CloseUpResult
 from rolling_panda.messages.types import Reason
 from rolling_panda.model.differential_drive import Array
+from rolling_panda.model.map_frame import MapFrame
 from rolling_panda.model.robot import ARM_Q, ARM_XI
 
 #: A cut command is repeated this often until the bridge has seen it (s).
@@ -168,6 +170,8 @@ def _base_pose(q: Array) -> Any:
 
 #: Smaller refinements of a point by perception are ignored (m).
 _REFINED = 0.0003
+#: The tool is among the canes if it is nearer to them than their clearance by more than this (m).
+_AMONG = 0.03
 #: Distance to the end of a motion at which the next one begins (m).
 _NEAR = 0.02
 
@@ -212,12 +216,12 @@ class Parts:
         if math.dist(robot.kinematics.T_odom_tool.translation, self.cut_at) > self.config.work.close_up_from:
             self.post_cut_check.request_close_up(self.cut_point, now)
 
-    def refine(self, point_id: str, motion: ToolMotion, known: m.Vector3 | None = None) -> None:
+    def refine(self, point_id: str, motion: ToolMotion, frame: MapFrame, known: m.Vector3 | None = None) -> None:
         """Correct a motion to the newest, more accurate position of its point, unless that is the `known` one."""
         ticket = self.queue.get(point_id)
         if ticket is None or ticket.point.position == known:
             return
-        _shift(motion, np.array(ticket.point.position))
+        _shift(motion, frame.position_in_odom(np.array(ticket.point.position)))
 
     def brake(self, robot: Measured, pause: m.Reason | None = None) -> StepResult:
         """Come to rest, or stay there; with a reason the work pauses."""
@@ -268,12 +272,19 @@ class CutTask:
     Attributes:
         point_id: The point.
         accepted: The point as accepted; the plan is for one acceptance.
-        plan: Poses and postures.
+        planned: Poses and postures in map.
+        frame: Where odom is in map.
     """
 
     point_id: str
     accepted: m.PruningPoint | None
-    plan: CutPlan
+    planned: CutPlan
+    frame: MapFrame
+
+    @cached_property
+    def plan(self) -> CutPlan:
+        """Poses and postures in odom."""
+        return self.planned.in_odom(self.frame)
 
 
 class Holds(Protocol):
@@ -299,12 +310,12 @@ class Stage(ABC):
 
     @property
     def plan(self) -> CutPlan | None:
-        """Plan of the cut under way; None without one."""
+        """Plan of the cut under way, in odom; None without one."""
         return None
 
     @property
     def plans(self) -> tuple[CutPlan, ...]:
-        """Plans of the cuts that the motion begins or ends at."""
+        """Plans of the cuts that the motion begins or ends at, in odom."""
         return ()
 
     def hold(self) -> None:
@@ -357,7 +368,7 @@ class Rest(Stage):
         """One period."""
         parts = self._parts
         xi, following = parts.saturation.ramp(robot.sent), parts.next_cut
-        if following.search(robot.q):
+        if following.search(robot.in_map(robot.q)):
             return Search(parts, following.point_id, following.accepted), StepResult(xi)
         # The last cut may still have to be made once more.
         beyond = parts.queue.count("UNREACHABLE")
@@ -372,12 +383,11 @@ class Escape(Stage):
 
     def step(self, robot: Measured, now: float) -> Step:
         """One period."""
-        config, pose = self._parts.config, robot.kinematics.T_odom_tool
-        towards_row = np.array([-np.sin(config.work.row_heading), np.cos(config.work.row_heading), 0.0])
-        depth = float(pose.translation @ towards_row) - (config.work.row_distance - config.work.clearance) - 0.03
-        if depth <= 0.0:
+        config = self._parts.config.work
+        clear = escape_pose(config, robot.kinematics.T_odom_tool, robot.frame, _AMONG)
+        if clear is None:
             return Rest(self._parts).step(robot, now)
-        leg = Leg(escape_pose(pose, towards_row, depth), robot.q, config.work.advance_speed, math.inf)
+        leg = Leg(clear, robot.q, config.advance_speed, math.inf)
         return Escaping(self._parts, FollowedMotion(self._parts, robot, leg)).step(robot, now)
 
 
@@ -425,9 +435,10 @@ class Search(Stage):
             return self._fail(robot, self.point_id, reasons.not_reachable(found.reason))
         if found is None or np.any(robot.sent):
             return self, result
-        legs = parts.segments.to(found, robot.kinematics.T_odom_tool, robot.q)
+        task = CutTask(self.point_id, self._accepted, found, robot.frame)
+        legs = parts.segments.to(task.plan, robot.kinematics.T_odom_tool, robot.q)
         way = FollowedMotion(parts, robot, *legs, to_cut=True)
-        return Travel(parts, CutTask(self.point_id, self._accepted, found), way), result
+        return Travel(parts, task, way), result
 
 
 class TaskStage(Stage):
@@ -445,7 +456,7 @@ class TaskStage(Stage):
 
     @property
     def plans(self) -> tuple[CutPlan, ...]:
-        """Plans of the cuts that the motion begins or ends at."""
+        """Plans of the cuts that the motion begins or ends at, in odom."""
         return (self._task.plan,)
 
 
@@ -457,20 +468,28 @@ class MovingStage(TaskStage):
         super().__init__(parts, task, way)
         self._way = way
 
+    def _follow_drift(self, robot: Measured) -> None:
+        """Lead the motion to where the cut is in odom now, with the tool clear of the canes."""
+        if robot.frame is self._task.frame:
+            return
+        before = self._task.plan
+        self._task = replace(self._task, frame=robot.frame)
+        plan, motion = self._task.plan, self._way.motion
+        motion.shift(plan.poses.clear.translation - before.poses.clear.translation, (plan.q_clear - before.q_clear)[:2])
+
     def _retreat(self, robot: Measured) -> "Retreat":
         """Straight out of the canes, and on to the next cut where one is found."""
         parts, following = self._parts, self._parts.next_cut
         parts.cut_at, parts.cut_point = robot.kinematics.T_odom_tool.translation.copy(), self.point_id
         back = parts.segments.out(self._task.plan, robot.q)
-        ticket, plan = parts.queue.get(self.point_id), following.found
+        ticket, found = parts.queue.get(self.point_id), following.found
         unsure = ticket is not None and ticket.state == "UNKNOWN"
-        if isinstance(plan, CutPlan) and following.stands and not unsure and not parts.ending:
-            onwards = parts.segments.to(plan, back.goal, back.q_goal)
-            way = FollowedMotion(parts, robot, back, *onwards, to_cut=True)
-        else:
-            following.forget()
-            way = FollowedMotion(parts, robot, back)
-        return Retreat(parts, self._task, way)
+        if isinstance(found, CutPlan) and following.stands and not unsure and not parts.ending:
+            onwards = CutTask(following.point_id, following.accepted, found, robot.frame)
+            legs = parts.segments.to(onwards.plan, back.goal, back.q_goal)
+            return Retreat(parts, self._task, FollowedMotion(parts, robot, back, *legs, to_cut=True), onwards)
+        following.forget()
+        return Retreat(parts, self._task, FollowedMotion(parts, robot, back))
 
 
 class Travel(MovingStage):
@@ -485,8 +504,9 @@ class Travel(MovingStage):
             return self._escape(robot, now, left)
         if parts.ending:
             return self, parts.brake(robot, parts.ending)
+        self._follow_drift(robot)
         if not config.work.pre_cut_check:
-            parts.refine(self.point_id, motion)
+            parts.refine(self.point_id, motion, robot.frame)
         parts.look_back(robot, now)
         tracking = self._way.track(robot)
         result = StepResult(tracking.xi, tracking)
@@ -514,6 +534,7 @@ class CloseUp(MovingStage):
             return self._escape(robot, now, left)
         if parts.ending:
             return self, parts.brake(robot, parts.ending)
+        self._follow_drift(robot)
         tracking, close_up = self._way.track(robot), parts.close_ups.answer(self.point_id, now)
         result = StepResult(tracking.xi, tracking)
         if close_up is None:
@@ -528,7 +549,8 @@ class CloseUp(MovingStage):
         motion.extend(parts.segments.into(self._task.plan))
         _shift(motion, position)
         self._way.timeout.start(motion.duration)
-        moved = 0.0 if accepted is None else float(np.linalg.norm(position - accepted.position))
+        known = None if accepted is None else robot.frame.position_in_odom(np.array(accepted.position))
+        moved = 0.0 if known is None else math.dist(position, known)
         if moved > TOLD_MOVED:
             result = result.with_event(reasons.cut_where_seen(self.point_id, 1e3 * moved))
         return Advance(parts, self._task, self._way, None if ticket is None else ticket.point.position), result
@@ -559,7 +581,7 @@ class Advance(MovingStage):
         if left or parts.ending:
             stage, result = self._retreat(robot).step(robot, now)
             return stage, result.with_event(left) if left else result
-        parts.refine(self.point_id, motion, self._close_up_of)
+        parts.refine(self.point_id, motion, robot.frame, self._close_up_of)
         tracking = self._way.track(robot)
         result = StepResult(tracking.xi, tracking)
         there = timeout.over(tracking, now, config.work.position_tolerance, config.work.rotation_tolerance)
@@ -590,7 +612,7 @@ class Cutting(MovingStage):
         blades, following, tracking = self._parts.blades, self._parts.next_cut, self._way.track(robot)
         if not blades.busy:
             return self._retreat(robot), StepResult(tracking.xi, tracking)
-        if following.search(robot.q):
+        if following.search(robot.in_map(robot.q)):
             following.step()
         return self, StepResult(tracking.xi, tracking, cut=blades.command(now))
 
@@ -600,12 +622,6 @@ class LeavingStage(TaskStage):
 
     phase: m.Phase = "RETREAT"
     in_canes = True
-
-    @property
-    def plans(self) -> tuple[CutPlan, ...]:
-        """Plans of the cuts that the motion begins or ends at."""
-        onwards = self._parts.next_cut.found
-        return (self._task.plan, onwards) if isinstance(onwards, CutPlan) else (self._task.plan,)
 
     def _out(self, robot: Measured, tracking: Tracking, now: float) -> Step:
         """Clear of the canes, with no next cut under way."""
@@ -619,21 +635,25 @@ class LeavingStage(TaskStage):
 class Retreat(LeavingStage):
     """Straight out of the canes, and on to the next cut."""
 
-    def __init__(self, parts: Parts, task: CutTask, way: FollowedMotion) -> None:
-        """From one cut, along `way`."""
+    def __init__(self, parts: Parts, task: CutTask, way: FollowedMotion, onwards: CutTask | None = None) -> None:
+        """From one cut, along `way`, which leads `onwards` if there is a next one."""
         super().__init__(parts, task, way)
-        self._way = way
+        self._way, self._onwards = way, onwards
+
+    @property
+    def plans(self) -> tuple[CutPlan, ...]:
+        """Plans of the cuts that the motion begins or ends at."""
+        return (self._task.plan,) if self._onwards is None else (self._task.plan, self._onwards.plan)
 
     def step(self, robot: Measured, now: float) -> Step:
         """One period."""
-        parts, following, timeout = self._parts, self._parts.next_cut, self._way.timeout
+        parts, timeout = self._parts, self._way.timeout
         parts.look_back(robot, now)
         tracking = self._way.track(robot)
         result = StepResult(tracking.xi, tracking)
-        if self._way.motion.leg > 0 and isinstance(following.found, CutPlan):
+        if self._way.motion.leg > 0 and self._onwards is not None:
             # Clear of the canes, and the motion to the next cut has begun.
-            task = CutTask(following.point_id, following.accepted, following.found)
-            return Travel(parts, task, self._way), result
+            return Travel(parts, self._onwards, self._way), result
         if timeout.over(tracking, now, _NEAR):
             return self._out(robot, tracking, now)
         if timeout.late(now):

@@ -15,6 +15,8 @@ from rolling_panda.messages.types import Reason
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import ARM_Q
 
+#: Room between the clearance from the canes and the tool when the arm begins to turn home (m).
+_ROOM = 0.03
 #: Tolerance of the posture (rad).
 _NEAR = 0.01
 #: Rate of the clock, and time below it (s), from which the motion counts as blocked.
@@ -30,8 +32,6 @@ class Homing:
         """Bind the parts for a control period of `dt` (s); the goal is `posture` (7, rad), or the survey posture."""
         self._config, self._follower, self._dt = config, follower, dt
         self._goal = np.array(config.work.home) if posture is None else posture
-        heading = config.work.row_heading
-        self._left = np.array([-np.sin(heading), np.cos(heading), 0.0])
         self._out: ToolMotion | None = None
         self._in: ArmMotion | None = None
         self._held_s = 0.0
@@ -42,11 +42,8 @@ class Homing:
     def step(self, robot: Measured) -> Array:
         """One period: ξ̇ to send (9)."""
         if self._in is None:
-            depth = float(robot.kinematics.T_odom_tool.translation @ self._left)
-            depth -= self._config.work.row_distance - self._config.work.clearance - 0.03
-            if self._out is None and depth > 0.0:
-                pose = robot.kinematics.T_odom_tool
-                goal = escape_pose(pose, self._left, depth)
+            pose = robot.kinematics.T_odom_tool
+            if self._out is None and (goal := escape_pose(self._config.work, pose, robot.frame, -_ROOM)) is not None:
                 out = Leg(goal, robot.q, self._config.work.advance_speed, math.inf)
                 self._out = ToolMotion(self._config.motion, self._config.whole_body, pose, robot.q, [out])
             if self._out is not None:

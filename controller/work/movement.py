@@ -127,7 +127,7 @@ class Movement:
         self.body.update(inbox)
         self.body.surroundings.work_at(self.sequence.places)
         self._clearance.update(inbox.newest(Obstacles))
-        self.posture_check.update(inbox.newest(Obstacles))
+        self.posture_check.update(self.body.obstacles)
 
     def look_around(self, prefix: str) -> None:
         """Begin to look at the calibration's board, or at the row, from several places."""

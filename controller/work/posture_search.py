@@ -1,5 +1,7 @@
 """Tool poses of a cut, and the search for a posture: base position along the row, approach azimuth, arm posture.
 
+Everything is in map, where the row stands still.
+
 The blade plane is square to the cane, and the approach is from the side of the robot.
 
 The search is a generator that yields after each iteration, so that a control period runs a few iterations only.
@@ -21,6 +23,7 @@ from rolling_panda.errors import InputError
 from rolling_panda.messages.perception import Obstacles, PruningPoint
 from rolling_panda.messages.types import Reason
 from rolling_panda.model.differential_drive import Array
+from rolling_panda.model.map_frame import MapFrame
 from rolling_panda.model.robot import ARM_Q, RobotModel
 from rolling_panda.transport.inbox import Received
 
@@ -30,7 +33,7 @@ _LEAST_SINE = 0.2
 
 @dataclass(frozen=True)
 class CutPoses:
-    """The poses T_odom_tool (pin.SE3) of one cut, on one line: `clear` of the canes, `stand_off`, and the `cut`."""
+    """The poses of the tool (pin.SE3) of one cut, on one line: `clear` of the canes, `stand_off`, and the `cut`."""
 
     clear: Any
     stand_off: Any
@@ -49,9 +52,9 @@ def cut_poses(
     """The poses of a cut.
 
     Args:
-        position: Point on the cane's axis (3, m, odom).
-        tangent: Unit vector along the cane (3, odom), either sense.
-        towards_row: Horizontal unit vector from the robot's path to the row (3, odom).
+        position: Point on the cane's axis (3, m, map).
+        tangent: Unit vector along the cane (3, map), either sense.
+        towards_row: Horizontal unit vector from the robot's path to the row (3, map).
         stand_off: Distance back from the cut (m).
         clearance: Distance back where the tool is clear of the canes (m).
         azimuth: Turn of the approach about the cane (rad); 0 is closest to `towards_row`.
@@ -80,15 +83,26 @@ def cut_poses(
     return CutPoses(back(clearance), back(stand_off), back(0.0))
 
 
-def escape_pose(T_odom_tool: Any, towards_row: Array, depth: float) -> Any:
-    """The tool pose after a straight retreat, so that it is `depth` (m) nearer to the robot's path; same orientation.
+def escape_pose(config: WorkConfig, T_odom_tool: Any, frame: MapFrame, deeper: float) -> Any | None:
+    """The tool pose after a straight retreat from the canes, with the same orientation; None clear of them.
 
     The retreat is along the tool's own axis where that leads away from the row, else square to the row.
+
+    Args:
+        config: Where the row is, and the clearance from its canes.
+        T_odom_tool: Of the tool (pin.SE3).
+        frame: Where odom is in map.
+        deeper: The tool may be so much nearer to the row than the clearance (m).
     """
-    back = -T_odom_tool.rotation[:, 2]
+    T_map_tool = frame.pose_in_map(T_odom_tool)
+    towards_row = np.array([-np.sin(config.row_heading), np.cos(config.row_heading), 0.0])
+    depth = float(T_map_tool.translation @ towards_row) - (config.row_distance - config.clearance) - deeper
+    if depth <= 0.0:
+        return None
+    back = -T_map_tool.rotation[:, 2]
     away = -float(back @ towards_row)
     direction, cosine = (back, away) if away > 0.5 else (-towards_row, 1.0)
-    return pin.SE3(T_odom_tool.rotation, T_odom_tool.translation + direction * (depth / cosine))
+    return frame.pose_in_odom(pin.SE3(T_map_tool.rotation, T_map_tool.translation + direction * (depth / cosine)))
 
 
 #: Positions of the cut ahead of the axle (m), in order of preference.
@@ -121,7 +135,7 @@ _DAMPING = np.eye(6) * 1e-4
 
 @dataclass(frozen=True)
 class CutPlan:
-    """A reachable cut.
+    """A reachable cut, in map unless it is said to be in odom.
 
     Attributes:
         poses: Tool poses of the cut.
@@ -138,6 +152,14 @@ class CutPlan:
     q_cut: Array
     joint_margin: float
     manipulability: float
+
+    def in_odom(self, frame: MapFrame) -> "CutPlan":
+        """The plan in odom of one in map."""
+        if frame.T_map_odom is None:
+            return self
+        poses = CutPoses(*(frame.pose_in_odom(T) for T in (self.poses.clear, self.poses.stand_off, self.poses.cut)))
+        q_clear, q_stand_off, q_cut = map(frame.configuration_in_odom, (self.q_clear, self.q_stand_off, self.q_cut))
+        return CutPlan(poses, q_clear, q_stand_off, q_cut, self.joint_margin, self.manipulability)
 
 
 @dataclass(frozen=True)
@@ -192,8 +214,8 @@ class PostureSearch:
         """Search, yielding once an iteration.
 
         Args:
-            position: Position of the cut (3, m, odom).
-            tangent: Unit vector along the cane (3, odom).
+            position: Position of the cut (3, m, map).
+            tangent: Unit vector along the cane (3, map).
             q: Current configuration (12): the base keeps its distance to the row.
             azimuth: Turn of the approach about the cane (rad) set by a person; None leaves it to the search.
         """
@@ -394,7 +416,7 @@ class NextCut:
         return None if self._ticket is None else self._ticket.accepted
 
     def search(self, q: Array) -> bool:
-        """Search for the next accepted point from configuration q (12), unless its search is under way.
+        """Search for the next accepted point from configuration q (12, map), unless its search is under way.
 
         Returns:
             False when no point is accepted, or the next one may not be gone to.

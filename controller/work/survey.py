@@ -81,19 +81,20 @@ class Survey:
             if self._homing.done:
                 self._homing = None
             return result
-        x, aside = float(robot.q[:2] @ self._along), float(robot.q[:2] @ self._left)
+        base = robot.in_map(robot.q)[:3]
+        x, aside = float(base[:2] @ self._along), float(base[:2] @ self._left)
         if self._line is None:
             self._line = x, aside
             self._stops = self._waypoints(robot, x)
             self._goal = self._stops.pop(0)
         if abs(self._goal - x) > _NEAR and self._there_at is None:
-            return self._drive(robot, x, aside - self._line[1], now)
+            return self._drive(robot, x, aside - self._line[1], float(base[2]), now)
         return self._wait(robot, now)
 
-    def _drive(self, robot: Measured, x: float, aside: float, now: float) -> StepResult:
+    def _drive(self, robot: Measured, x: float, aside: float, heading: float, now: float) -> StepResult:
         left = self._goal - x
         speed = math.copysign(min(self._config.work.survey_speed, math.sqrt(2.0 * _BRAKING * abs(left))), left)
-        turned = math.remainder(float(robot.q[2]) - self._config.work.row_heading, math.tau)
+        turned = math.remainder(heading - self._config.work.row_heading, math.tau)
         turning = -_GAIN_HEADING * turned - _GAIN_ASIDE * speed * aside
         xi = np.zeros(NXI)
         xi[:2] = wheels(robot, speed, turning)
@@ -127,7 +128,7 @@ class Survey:
         if self._place is None or self._place.position is None:
             return [x + self._distance]
         # The arm is home: the camera is at the tool, so far ahead of the base.
-        ahead = float(robot.kinematics.T_odom_tool.translation[:2] @ self._along) - x
+        ahead = float(robot.frame.pose_in_map(robot.kinematics.T_odom_tool).translation[:2] @ self._along) - x
         before = float(np.array(self._place.position)[:2] @ self._along) - ahead
         stops = [before + side for side in _SIDES]
         return stops if abs(stops[0] - x) <= abs(stops[-1] - x) else stops[::-1]

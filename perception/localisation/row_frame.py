@@ -1,4 +1,4 @@
-"""The frame `map` of perception: positions are stored in it and published in `odom`, which drifts against it.
+"""The frame `map` of the row, in which perception stores and tells positions, and `odom`, which drifts against it.
 
 The transform in use differs from the newest estimate by less than the estimate can tell. It stays the identity until
 the odometry is wrong by more than `_DEPARTS`, so that a robot with good odometry has the same results as without.
@@ -19,7 +19,7 @@ from perception.segmentation.frame import View
 from perception.tracking.camera_rays import Ray
 from rolling_panda import messages as m
 from rolling_panda import reasons
-from rolling_panda.messages.perception import Capsule, CloseUpResult, Localisation, point_digest
+from rolling_panda.messages.perception import CloseUpResult, Localisation
 from rolling_panda.messages.types import Vector3
 from rolling_panda.model.robot import pose_message
 from rolling_panda.model.wire_values import vector3
@@ -39,11 +39,9 @@ _CAUSES: dict[Cause, Callable[[], m.Reason]] = {
 #: x, y and heading among the six components of the estimate.
 _PLANAR = [X, Y, RZ]
 
-Lines = tuple[tuple[Vector3, ...], ...]
-
 
 class RowFrame:
-    """The transform from odom to map: it converts frames into map, and points, canes and obstacles into odom."""
+    """The transform from odom to map, by which frames are used in map."""
 
     def __init__(self, on: bool) -> None:
         """At the origin of both; off, they stay one."""
@@ -51,7 +49,6 @@ class RowFrame:
         self._localiser = RowLocaliser()
         #: T_map_odom in use; None for the identity.
         self._T: pin.SE3 | None = None
-        self._told: tuple[tuple[Capsule, ...], pin.SE3 | None, tuple[Capsule, ...]] = ((), None, ())
 
     @property
     def estimate(self) -> Estimate:
@@ -152,48 +149,11 @@ class RowFrame:
         T = self._T
         return ray if T is None else Ray(T.act(ray.origin), T.rotation @ ray.direction)
 
-    def points_in_odom(self, points: tuple[m.PruningPoint, ...]) -> tuple[m.PruningPoint, ...]:
-        """Points in map as they are told."""
-        return points if self._T is None else tuple(self._point(point) for point in points)
-
-    def sites_in_odom(self, sites: tuple[m.UndecidedSite, ...]) -> tuple[m.UndecidedSite, ...]:
-        """Undecided sites in map as they are told."""
-        if self._T is None:
-            return sites
-        return tuple(
-            site if site.position is None else replace_message(site, position=self._place(site.position))
-            for site in sites
-        )
-
-    def lines_in_odom(self, lines: Lines) -> Lines:
-        """Lines in map as they are told."""
-        if self._T is None or not lines:
-            return lines
-        T = self._T.inverse()
-        points = iter((np.array([p for line in lines for p in line]) @ T.rotation.T + T.translation).tolist())
-        return tuple(tuple((x, y, z) for x, y, z in (next(points) for _ in line)) for line in lines)
-
-    def capsules_in_odom(self, capsules: tuple[Capsule, ...]) -> tuple[Capsule, ...]:
-        """Capsules in map as they are told: the same object for the same capsules and transform."""
-        if self._T is None:
-            return capsules
-        if self._told[0] is not capsules or self._told[1] is not self._T:
-            ends = self.lines_in_odom(tuple((each.start, each.end) for each in capsules))
-            told = tuple(
-                replace_message(each, start=start, end=end) for each, (start, end) in zip(capsules, ends, strict=True)
-            )
-            self._told = capsules, self._T, told
-        return self._told[2]
-
     def check_in_odom(self, check: CloseUpResult) -> CloseUpResult:
-        """The result of a close-up in map as it is told."""
+        """The result of a close-up in map as it is told: in odom, since it is measured from where the arm is."""
         if self._T is None or check.position is None or check.tangent is None:
             return check
         return replace_message(check, position=self._place(check.position), tangent=self._direction(check.tangent))
-
-    def _point(self, point: m.PruningPoint) -> m.PruningPoint:
-        told = replace_message(point, position=self._place(point.position), tangent=self._direction(point.tangent))
-        return replace_message(told, digest=point_digest(told))
 
     def _place(self, position: Vector3) -> Vector3:
         assert self._T is not None

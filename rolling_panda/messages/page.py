@@ -262,8 +262,8 @@ class PickRay(PageMessage, frozen=True, kw_only=True):
     """A click in the 3-D view while points are placed by hand.
 
     Attributes:
-        origin: Origin of the pick ray in odom (m).
-        direction: Unit direction of the pick ray in odom.
+        origin: Origin of the pick ray in map (m).
+        direction: Unit direction of the pick ray in map.
     """
 
     origin: Vector3
@@ -274,7 +274,7 @@ class Measured(PageMessage, frozen=True, kw_only=True):
     """Result of a measurement between two clicks in the 3-D view.
 
     Attributes:
-        offset: Second position minus the first, in odom (m).
+        offset: Second position minus the first, in map (m).
         between: Names of the clicked objects.
     """
 

@@ -38,8 +38,8 @@ class PruningPoint(Struct, frozen=True, forbid_unknown_fields=True):
     Attributes:
         point_id: Stable while the point is tracked from frame to frame.
         revision: Increases when the cut changes: its kind, the nodes kept, or its place or tangent by more than noise.
-        position: Position on the cane's axis, in odom (m).
-        tangent: Unit vector along the cane in odom, pointing away from the cordon.
+        position: Position on the cane's axis, in map (m).
+        tangent: Unit vector along the cane in map, pointing away from the cordon.
         radius: Radius of the cane (m).
         confidence: 0 … 1.
         nodes_seen: Number of count nodes seen on the cane, without the basal bud.
@@ -110,7 +110,7 @@ class UndecidedSite(Struct, frozen=True, forbid_unknown_fields=True):
         needs: Another look by the camera, or a decision by the operator; nothing where one has left it as it is.
         vine: Number of the vine; 0 for no particular spur.
         spur: Number of the spur on that vine; 0 for no particular spur.
-        position: Position of the spur in odom (m), if known.
+        position: Position of the spur in map (m), if known.
     """
 
     reason: Reason
@@ -124,12 +124,12 @@ class PruningPoints(Message, frozen=True, kw_only=True):
     """Perception → all: all current pruning points.
 
     Attributes:
-        header: `frame_id` is odom.
+        header: `frame_id` is map.
         segmenter: Name of the segmenter.
         frames: Number of camera frames used so far.
         points: All current points.
         undecided_sites: Spurs seen without a point, over all frames.
-        canes: Axis of each perceived cane, a polyline in odom (m).
+        canes: Axis of each perceived cane, a polyline in map (m).
         rule: Current pruning rule; None if unknown.
     """
 
@@ -260,8 +260,8 @@ class CloseUpResult(Message, frozen=True, kw_only=True):
 class Localisation(Message, frozen=True, kw_only=True):
     """Perception → controller: where the robot is in the row.
 
-    The wood stands still in map, against which odom drifts. All other messages are in odom, by the transform in use
-    when they were made: it may jump, and places with it.
+    The wood stands still in map: points, obstacles and plans are in it. The robot's motion is in odom, which drifts
+    against it. The transform may jump.
 
     Attributes:
         header: Stamp of the newest frame; `frame_id` is map.
@@ -287,12 +287,12 @@ Number = Annotated[int, Meta(ge=-1, le=10**6)]
 
 
 class Capsule(Struct, frozen=True, forbid_unknown_fields=True):
-    """A capsule in odom.
+    """A capsule, in the frame of its message.
 
     Attributes:
         kind: Class of the wood or object.
-        start: First end of the axis in odom (m).
-        end: Second end of the axis in odom (m).
+        start: First end of the axis (m).
+        end: Second end of the axis (m).
         start_radius: Radius at `start` (m).
         end_radius: Radius at `end` (m).
         vine: Number of the vine, as in pruning points; -1 for none.
@@ -391,7 +391,7 @@ class Scenery(Message, frozen=True, kw_only=True):
     """Simulated bridge → server: the simulated row, for display only. Perception and control never subscribe to it.
 
     Attributes:
-        header: `frame_id` is odom.
+        header: `frame_id` is map.
         revision: Increases when something is severed.
         capsules: All parts of the row.
     """
@@ -405,7 +405,7 @@ class Obstacles(Message, frozen=True, kw_only=True):
     """Perception → controller: obstacles for base and arm, as far as seen.
 
     Attributes:
-        header: `frame_id` is odom.
+        header: `frame_id` is map.
         capsules: Posts, trunks, cordons, wires and retained canes. Wood that will be cut off is not an obstacle: it
             gives way.
     """

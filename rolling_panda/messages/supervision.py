@@ -66,7 +66,7 @@ class QueueEntry(Struct, frozen=True, forbid_unknown_fields=True):
         reason: Reason for the state; None without one.
         user: The person who last decided about the point.
         cut_id: Its last cut; empty before the first.
-        accepted_position: Position at acceptance, in odom (m).
+        accepted_position: Position at acceptance, in map (m).
         digest: Hash of the accepted point, see `PruningPoint.digest`.
         recorded: The point from the ledger, if perception does not report it and a person has to decide.
         azimuth: Requested turn of the approach about the cane (rad); None if the posture search chooses it.
@@ -340,7 +340,7 @@ class PointPlan(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
         revision: Accepted revision that the plan is for.
         order: Position in the order of work, from 1; 0 for a refused point.
         reason: Reason for the refusal; None otherwise.
-        base: Pose of base_link in odom at the cut; None for a refused point.
+        base: Pose of base_link in map at the cut; None for a refused point.
         rollout: Figures of the motion to it and out again; None for a refused point, and for a later one
             until the work comes near it.
     """
@@ -357,7 +357,7 @@ class SessionPlan(Message, frozen=True, kw_only=True):
     """Controller → all: order and rollout of the work on the accepted points.
 
     Attributes:
-        header: `frame_id` is odom.
+        header: `frame_id` is map.
         state: `valid` while the work follows the plan; `void` after a change; `planning` until the next plan is ready.
         reason: Reason why the plan is void or missing.
         plan_hash: SHA-256 of the inputs and the content of the plan; empty without a plan.
@@ -380,14 +380,14 @@ class PreviewState(Message, frozen=True, kw_only=True):
     """Controller → all: state, figures and approval of the preview.
 
     Attributes:
-        header: `frame_id` is odom.
+        header: `frame_id` is map.
         required: True if a cut needs an approved preview.
         phase: `waiting` for the robot to rest and for the plan; `rolling` while it is computed; `ready` for approval;
             `approved`; `expired` after a change.
         reason: The change that expired it, or the cause of waiting.
         preview_hash: SHA-256 of the inputs and the content of the preview; empty without a preview.
         approved_by: Name of the person who approved it; empty without an approval.
-        start: Pose of base_link in odom at the start.
+        start: Pose of base_link in map at the start.
         position: Actuated coordinates at the start (rad).
         duration_s: Duration of the preview (s).
         cuts: Points in the order of work.
@@ -412,9 +412,9 @@ class PreviewRow(Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         time: Time from the start (s).
-        base: Pose of base_link in odom.
+        base: Pose of base_link in map.
         position: Actuated coordinates (rad).
-        tool: Position of the tool in odom (m).
+        tool: Position of the tool in map (m).
     """
 
     time: NonNegative
@@ -427,7 +427,7 @@ class PreviewMotion(Message, frozen=True, kw_only=True):
     """Controller → server: the motion of a preview, for the ghost in the 3-D view.
 
     Attributes:
-        header: `frame_id` is odom.
+        header: `frame_id` is map.
         preview_hash: Hash of the preview, see `PreviewState`.
         rows: Samples of the motion.
     """

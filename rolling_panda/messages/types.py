@@ -83,7 +83,7 @@ class Pose(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class PlanarPose(Struct, frozen=True, forbid_unknown_fields=True):
-    """Pose of base_link in odom, on the ground plane.
+    """Pose of base_link on the ground plane; the field that contains it names the frame.
 
     Attributes:
         x: Forward (m).

@@ -66,11 +66,11 @@ def outdated(state: PreviewState, preview_hash: str, posture: Posture | None) ->
 
 
 def _deviation(start: m.PlanarPose, position: m.Actuated, posture: Posture) -> m.Reason | None:
-    base = posture.base
-    moved = math.hypot(base.x - start.x, base.y - start.y)
+    x, y, heading = posture.q_in_map[:3].tolist()
+    moved = math.hypot(x - start.x, y - start.y)
     if moved > _BASE_TOLERANCE:
         return reasons.preview_base_moved(moved)
-    turned = abs(math.remainder(base.phi - start.phi, math.tau))
+    turned = abs(math.remainder(heading - start.phi, math.tau))
     if turned > _HEADING_TOLERANCE:
         return reasons.preview_base_turned(math.degrees(turned))
     joint_change = max(abs(now - then) for now, then in zip(posture.position[2:], position[2:], strict=True))

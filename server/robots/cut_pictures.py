@@ -8,6 +8,7 @@ from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.cut_pictures import Box, CloseUps, CutCloseUp, Moment, PictureFolder, box_of, cropped
 from rolling_panda.messages.robot import CameraFrame
+from rolling_panda.model.map_frame import MapFrame
 from rolling_panda.model.robot import RobotModel
 
 #: Close-ups that wait for the next `step`.
@@ -29,8 +30,14 @@ class CutPictures:
         """Take in a close-up; from any thread."""
         self._frames.append(frame)
 
-    async def step(self, queue: tuple[m.QueueEntry, ...]) -> None:
-        """Write the pictures of the close-ups since the last step; `queue` is the controller's."""
+    async def step(self, queue: tuple[m.QueueEntry, ...], where: MapFrame) -> None:
+        """Write the pictures of the close-ups since the last step.
+
+        Args:
+            queue: The controller's.
+            where: Where odom is in map.
+        """
+        self._close_ups.where = where
         found: list[CutCloseUp | None] = []
         while self._frames:
             found.append(self._close_ups.add(self._frames.popleft()))

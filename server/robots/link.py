@@ -10,6 +10,7 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,10 +20,14 @@ from rolling_panda import __version__, reasons, topics
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.commands import EvaluateRule, PlantRequest
-from rolling_panda.errors import ServiceError
+from rolling_panda.errors import ModelError, ServiceError
 from rolling_panda.messages.page import ProcessPresence
+from rolling_panda.messages.perception import Localisation
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.messages.supervision import Presence, StopState, TeleopTarget
+from rolling_panda.model.differential_drive import Array
+from rolling_panda.model.map_frame import MapFrame
+from rolling_panda.model.robot import configuration
 from rolling_panda.reasons import said
 from rolling_panda.transport.inbox import Received
 from rolling_panda.transport.zenoh import Transport
@@ -38,11 +43,29 @@ _MAX_IMAGES = 5
 
 @dataclass(frozen=True)
 class Posture:
-    """The measured posture: base in odom, [θ_l, θ_r, q₁…q₇] (rad), and the age of the older of both (s)."""
+    """The measured posture.
+
+    Attributes:
+        base: Pose of the base in odom.
+        position: [θ_l, θ_r, q₁…q₇] (rad).
+        age_s: Age of the older of both (s).
+        where: Where odom is in map.
+    """
 
     base: m.PlanarPose
     position: m.Actuated
     age_s: float
+    where: MapFrame = MapFrame()
+
+    @property
+    def q(self) -> Array:
+        """The configuration (12), with the base in odom."""
+        return configuration(self.base, self.position)
+
+    @property
+    def q_in_map(self) -> Array:
+        """The configuration (12), with the base in map."""
+        return self.where.configuration_in_map(self.q)
 
 
 class RobotLink:
@@ -75,6 +98,8 @@ class RobotLink:
         self.obstacles = transport.slot(topics.OBSTACLES)
         self.camera_state = transport.slot(topics.CAMERA_STATE)
         self.robot_calibration = transport.slot(topics.ROBOT_CALIBRATION)
+        self._localisation = transport.slot(topics.LOCALISATION)
+        self._located: tuple[Localisation | None, MapFrame] = None, MapFrame()
         self.pictures = PictureStore()
         transport.subscribe(topics.PICTURES, lambda picture, at: self.pictures.add(picture))
         self.control = transport.slot(topics.CONTROL)
@@ -147,12 +172,23 @@ class RobotLink:
         event = m.LogEvent(header=m.Header(stamp=now), process="server", reason=reason)
         self._writer.submit(self._event.put, event)
 
+    @property
+    def map_frame(self) -> MapFrame:
+        """Where odom is in map."""
+        told = self._localisation.peek()
+        if told is not None and told.message is not self._located[0]:
+            # A transform that is none changes nothing.
+            with suppress(ModelError):
+                self._located = told.message, MapFrame.told(told.message)
+        return self._located[1]
+
     def posture(self, now: float) -> Posture | None:
         """The measured posture, or None before the first joints and odometry."""
         joints, odometry = self.joints.peek(), self.odometry.peek()
         if joints is None or odometry is None:
             return None
-        return Posture(odometry.message.pose, joints.message.position, now - min(joints.at, odometry.at))
+        age_s = now - min(joints.at, odometry.at)
+        return Posture(odometry.message.pose, joints.message.position, age_s, self.map_frame)
 
     def presence(self, now: float) -> tuple[ProcessPresence, ...]:
         """One row for each process: whether it is connected, and the age of its last message."""

@@ -1,6 +1,7 @@
 """The page's messages, built from the newest messages of the robot."""
 
 import math
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -12,7 +13,8 @@ from rolling_panda.messages.perception import CameraMount
 from rolling_panda.messages.robot import CameraFrame, JointState
 from rolling_panda.messages.supervision import SessionPlan
 from rolling_panda.messages.types import Role
-from rolling_panda.model.robot import ARM_Q, Limits, RobotModel, configuration, pose_message
+from rolling_panda.model.map_frame import MapFrame
+from rolling_panda.model.robot import ARM_Q, Limits, RobotModel, configuration, placement, pose_message
 from rolling_panda.model.wire_values import vector3
 from server.auth.sessions import Session
 from server.robots.link import RobotLink
@@ -98,15 +100,20 @@ class PageView:
         )
 
     def tool(self, now: float) -> m.Pose | None:
-        """Measured T_odom_tool; None before the first posture."""
+        """Measured T_map_tool; None before the first posture."""
         posture = self._link.posture(now)
         if posture is None:
             return None
-        return pose_message(self.model.pose(configuration(posture.base, posture.position), self.model.tool_id))
+        return pose_message(posture.where.pose_in_map(self.model.pose(posture.q, self.model.tool_id)))
+
+    def in_odom(self, T_map_tool: m.Pose) -> m.Pose:
+        """T_odom_tool of a pose of the tool in map."""
+        where = self._link.map_frame
+        return T_map_tool if where.T_map_odom is None else pose_message(where.pose_in_odom(placement(T_map_tool)))
 
     def camera(self, frame: CameraFrame) -> m.Pose:
-        """T_odom_camera when a frame was taken."""
-        return pose_message(self.model.pose(configuration(frame.base, frame.position), self.model.camera_id))
+        """T_map_camera when a frame was taken."""
+        return pose_message(camera_pose(frame, self.model, self._link.map_frame))
 
     def points(self, now: float) -> PagePoints:
         """All points in the order of work; points that perception no longer reports stay while they are queued.
@@ -153,8 +160,9 @@ class PageView:
             for point in points
             if point.point_id not in queued
         ]
-        pixels = project([point.position for point, _ in rows], camera, self.model)
-        ahead = project([_ahead(point) for point, _ in rows], camera, self.model)
+        where = self._link.map_frame
+        pixels = project([point.position for point, _ in rows], camera, self.model, where)
+        ahead = project([_ahead(point) for point, _ in rows], camera, self.model, where)
         planned = {} if plan is None or plan.state != "valid" else {each.point_id: each for each in plan.points}
         return PagePoints(
             points=tuple(
@@ -194,13 +202,18 @@ def addressed(state: PageState, session: Session) -> PageState:
     return msgspec.structs.replace(state, user=session.user, role=role, client=session.client)
 
 
+def camera_pose(frame: CameraFrame, model: RobotModel, where: MapFrame) -> Any:
+    """T_map_camera (pin.SE3) when a frame was taken."""
+    return where.pose_in_map(model.pose(configuration(frame.base, frame.position), model.camera_id))
+
+
 def project(
-    positions: list[m.Vector3], frame: CameraFrame | None, model: RobotModel
+    positions: list[m.Vector3], frame: CameraFrame | None, model: RobotModel, where: MapFrame
 ) -> list[tuple[float, float] | None]:
-    """Pixels of points in odom (m) in a camera frame, whole numbers; None where outside the image or behind."""
+    """Pixels of points in map (m) in a camera frame, whole numbers; None where outside the image or behind."""
     if frame is None or not positions:
         return [None] * len(positions)
-    camera = model.pose(configuration(frame.base, frame.position), model.camera_id)
+    camera = camera_pose(frame, model, where)
     points = (np.array(positions) - camera.translation) @ camera.rotation
     lens = model.lens(frame.intrinsics)
     pixels: list[tuple[float, float] | None] = []

@@ -9,7 +9,7 @@ from rolling_panda import messages as m
 from rolling_panda.messages.page import CameraPreset, Layer, Measured, PagePoints
 from rolling_panda.messages.supervision import ArmAngles
 from rolling_panda.model.differential_drive import Array
-from rolling_panda.model.robot import ARM_Q, configuration
+from rolling_panda.model.robot import ARM_Q
 from rolling_panda.model.wire_values import vector3
 from server.auth.sessions import Session
 from server.robots.link import RobotLink
@@ -37,15 +37,14 @@ class SceneUpdater:
         """Move the cameras of this session's views to a preset, once the robot's posture is known."""
         posture = self._link.posture(time.monotonic())
         if posture is not None:
-            q: Array = configuration(posture.base, posture.position)
-            self._scene.place_camera(session.session_id, preset, q)
+            self._scene.place_camera(session.session_id, preset, posture.q, posture.where)
 
     def show_posture(self, session: Session, angles: ArmAngles | None) -> None:
         """Show the arm in a posture (7, rad) on this session's views, where the base stands; None hides it."""
         posture = self._link.posture(time.monotonic())
         q: Array | None = None
         if angles is not None and posture is not None:
-            q = configuration(posture.base, posture.position)
+            q = posture.q_in_map.copy()
             q[ARM_Q] = angles
         self._scene.show_posture(session.session_id, q)
 
@@ -66,7 +65,7 @@ class SceneUpdater:
         self._scene.step_cameras(now)
         posture = self._link.posture(now)
         if posture is not None:
-            self._scene.move(configuration(posture.base, posture.position))
+            self._scene.move(posture.q, posture.where)
             self._scene.robot.set_grey(posture.age_s > _STALE_S)
         self._scene.falling.step(now)
 

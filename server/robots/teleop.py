@@ -291,7 +291,7 @@ class Teleoperation:
         key = session.session_id
         if command is None and (view or self._hold.holder != key):
             pose = self._scene.gizmos.pose(key)
-            command = None if pose is None else TeleopCommand(pose)
+            command = None if pose is None else TeleopCommand(self._view.in_odom(pose))
         if command is not None:
             self._hold.set_command(key, command)
         refused = self._refusal(session)
@@ -339,7 +339,7 @@ class Teleoperation:
         self._expire(now)
         if self._hold.holder != owner or not self._hold.follows_gizmo:
             return
-        self._hold.set_command(owner, TeleopCommand(target))
+        self._hold.set_command(owner, TeleopCommand(self._view.in_odom(target)))
         if now - self._sent_at >= _MIN_TARGET_PERIOD_S:
             self._sent_at = now
             self._send(now)

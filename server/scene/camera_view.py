@@ -54,7 +54,7 @@ def decode_frame(frame: CameraFrame) -> DecodedFrame | None:
 
 
 def draw_frustum(client: viser.ClientHandle, frame: DecodedFrame, wxyz: Array, position: Array) -> None:
-    """Draw in one view the camera's frustum with its image; pose of the camera in odom."""
+    """Draw in one view the camera's frustum with its image; pose of the camera in map."""
     height, width = frame.image.shape[:2]
     client.scene.add_camera_frustum(
         _FRUSTUM,

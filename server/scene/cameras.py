@@ -35,7 +35,7 @@ _ECHO = 0.03
 
 @dataclass(frozen=True)
 class CameraPose:
-    """Position of a camera and the point that it looks at (3 each, m, odom)."""
+    """Position of a camera and the point that it looks at (3 each, m, map)."""
 
     position: Array
     look_at: Array
@@ -51,8 +51,8 @@ def preset_pose(
             distance; `tool` shows the blades and what lies before them, and follows the tool; `top` looks down on robot
             and row.
         q: Configuration of the robot (12).
-        tool: Position of the tool (3, m, odom).
-        ahead: Direction in which the blades point (3, unit, odom); to the base's left by default.
+        tool: Position of the tool (3, m, map).
+        ahead: Direction in which the blades point (3, unit, map); to the base's left by default.
         rods: The robot, as far as it can hide the blades.
     """
     base = np.array([q[0], q[1], 0.0])
@@ -79,8 +79,8 @@ def close_up(point: Array, position: Array, heading: float, rods: Sequence[Capsu
     From the camera's direction where that is on the robot's side of the row and above it.
 
     Args:
-        point: To look at (3, m, odom).
-        position: Of the camera (3, m, odom).
+        point: To look at (3, m, map).
+        position: Of the camera (3, m, map).
         heading: Of the base (rad).
         rods: The robot, as far as it can hide the point.
     """
@@ -193,7 +193,7 @@ class SceneCameras:
                 )
 
     def fly(self, clients: list[viser.ClientHandle], point: Array, wait_for_user: bool = False) -> None:
-        """Fly the cameras of these views to a point (3, m, odom).
+        """Fly the cameras of these views to a point (3, m, map).
 
         Args:
             clients: Their views.
@@ -244,7 +244,7 @@ class SceneCameras:
             client.camera.look_at = pose.look_at
 
     def follow(self, q: Array, tool: Array | None = None) -> None:
-        """Move the cameras that follow base or tool (3, m, odom); an offset that the user has changed is kept."""
+        """Move the cameras that follow base or tool (3, m, map); an offset that the user has changed is kept."""
         self._update_initial_camera(q[:3])
         self._heading = float(q[2])
         base = np.array([q[0], q[1], 0.0])

@@ -14,7 +14,7 @@ from rolling_panda.model.wire_values import vector3
 from server.scene.meshes import capsules_mesh, color_of
 
 Line = tuple[m.Vector3, ...]
-#: Place of a cut (3, m, odom) and the cane's direction there (3, unit, away from the cordon).
+#: Place of a cut (3, m, map) and the cane's direction there (3, unit, away from the cordon).
 Cut = tuple[m.Vector3, m.UnitVector3]
 
 #: A cut belongs to the line that it is nearest to, within this distance (m) and with this cosine of the angle or more.
@@ -60,7 +60,7 @@ def standing(lines: Sequence[Line], cuts: dict[str, Cut]) -> tuple[list[Line], d
     Perception reports canes at full length until it has seen the cut, which it cannot while the robot works.
 
     Args:
-        lines: Axes of canes, each from its base on (m, odom).
+        lines: Axes of canes, each from its base on (m, map).
         cuts: By name.
     """
     left = list(lines)
@@ -152,7 +152,7 @@ class FallingPieces:
 
         Args:
             root: Node of the layer that they belong to; hidden with it.
-            capsules: In odom (m); at least one.
+            capsules: In map (m); at least one.
             now: Monotonic time (s).
             dim: Draw in the colours of the simulated row.
         """

@@ -22,7 +22,7 @@ _DEADBAND = 1e-3
 
 @dataclass
 class _Gizmo:
-    """A session's gizmo: `drawn` is the rotation of its arrows in odom, `offset` that of the tool in its arrows."""
+    """A session's gizmo: `drawn` is the rotation of its arrows in map, `offset` that of the tool in its arrows."""
 
     pose: m.Pose
     axes: GizmoAxes = "tool"
@@ -39,14 +39,14 @@ class SceneGizmos:
         """No gizmo is shown."""
         self._gizmos: dict[str, _Gizmo] = {}
         self.heading = 0.0
-        """Of the base in odom (rad), for gizmos along its axes."""
+        """Of the base in map (rad), for gizmos along its axes."""
 
     def shown(self, owner: str) -> bool:
         """Whether this session's gizmo is shown."""
         return owner in self._gizmos
 
     def show(self, owner: str, pose: m.Pose, clients: list[viser.ClientHandle], axes: GizmoAxes = "tool") -> None:
-        """Show the gizmo of `owner` at a pose in odom on these views, its arrows along these axes."""
+        """Show the gizmo of `owner` at a pose in map on these views, its arrows along these axes."""
         gizmo = self._gizmos.setdefault(owner, _Gizmo(pose))
         gizmo.axes = axes
         self._place(gizmo, pose)
@@ -71,7 +71,7 @@ class SceneGizmos:
         gizmo.handles[client.client_id] = handle
 
     def drag(self, owner: str, position: m.Vector3, wxyz: tuple[float, float, float, float]) -> m.Pose | None:
-        """`owner` has dragged the arrows to here in odom; returns the target pose of the tool, None without one."""
+        """`owner` has dragged the arrows to here in map; returns the target pose of the tool, None without one."""
         gizmo, drawn = self._gizmos.get(owner), pin.Quaternion(*wxyz)
         if gizmo is None or drawn.norm() < 1e-9:
             return None
@@ -110,7 +110,7 @@ class SceneGizmos:
                 self._place(gizmo, tool)
 
     def pose(self, owner: str) -> m.Pose | None:
-        """Pose of the tool at the gizmo of `owner` in odom; None without one."""
+        """Pose of the tool at the gizmo of `owner` in map; None without one."""
         gizmo = self._gizmos.get(owner)
         return None if gizmo is None else gizmo.pose
 

@@ -168,7 +168,7 @@ class PointMarkers:
     def _placed(
         self, view: _Drawn, rows: tuple[_Row, ...], camera: Camera, height: float
     ) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
-        """Places (n×3, m, odom) and sizes (n, m)."""
+        """Places (n×3, m, map) and sizes (n, m)."""
         places = np.array([row.position for row in rows], float)
         away = np.array(camera.position, float) - places
         distance = np.maximum(np.linalg.norm(away, axis=1), 0.02)

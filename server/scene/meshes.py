@@ -79,7 +79,7 @@ def color_of(kind: m.WoodClass, dim: bool = False) -> Color:
 def capsules_mesh(
     kind: m.WoodClass, capsules: list[Capsule], grow: float = 0.0
 ) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
-    """Vertices (V, 3) in odom (m) and faces (F, 3) of capsules. Their blunt tips close the bends between them.
+    """Vertices (V, 3) in map (m) and faces (F, 3) of capsules. Their blunt tips close the bends between them.
 
     Args:
         kind: Decides the number of sides.

@@ -24,7 +24,7 @@ class ClickListener:
     """Turns clicks into rays, on the views of the sessions that place points or measure, and on no others."""
 
     def __init__(self, on_ray: Callable[[str, m.Vector3, m.Vector3], object]) -> None:
-        """`on_ray(owner, origin, direction)` is called on viser's thread, in odom, for each click."""
+        """`on_ray(owner, origin, direction)` is called on viser's thread, in map, for each click."""
         self._on_ray = on_ray
         self._listening: dict[str, dict[int, tuple[viser.ClientHandle, Clicked]]] = {}
 
@@ -128,7 +128,7 @@ def hit_ground(ray: Ray) -> Hit:
 
 @dataclass(frozen=True)
 class PickedPoint:
-    """A picked point (3, m, odom), and the name of the surface there."""
+    """A picked point (3, m, map), and the name of the surface there."""
 
     position: Array
     surface: str

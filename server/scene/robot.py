@@ -13,6 +13,7 @@ from rolling_panda import messages as m
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.messages.supervision import PreviewMotion, PreviewRow
 from rolling_panda.model.differential_drive import Array
+from rolling_panda.model.map_frame import MapFrame
 from rolling_panda.model.robot import configuration
 from rolling_panda.model.wire_values import vector3
 from server.scene.meshes import Color
@@ -43,6 +44,7 @@ class SceneRobot:
         self._data = model.createData()
         self._base = int(model.getJointId(_BASE_JOINT))
         self._tool = int(model.getFrameId("tool"))
+        self._where = MapFrame()
         names = {0: "", self._base: "/robot"}
         self._frames: dict[int, viser.FrameHandle] = {}
         self._sent: dict[int, Array] = {}
@@ -60,12 +62,18 @@ class SceneRobot:
             self._meshes.append((handle, part.color))
         self._grey = False
 
-    def move(self, q: Array) -> bool:
-        """Show the robot at q (12); True when something was sent."""
+    def move(self, q: Array, where: MapFrame) -> bool:
+        """Show the robot as measured; True when something was sent.
+
+        Args:
+            q: Configuration (12), with the base in odom.
+            where: Where odom is in map.
+        """
         pin.forwardKinematics(self._model, self._data, q)
+        self._where = where
         moved = []
         for joint in self._frames:
-            placement = self._data.oMi[joint] if joint == self._base else self._data.liMi[joint]
+            placement = self._placed(joint) if joint == self._base else self._data.liMi[joint]
             x, y, z, w = pin.Quaternion(placement.rotation).coeffs()
             pose = np.array([*placement.translation, w, x, y, z])
             sent = self._sent.get(joint)
@@ -83,13 +91,17 @@ class SceneRobot:
 
     @property
     def tool(self) -> tuple[Array, Array]:
-        """Position of the tool (3, m) and the direction in which the blades point (3, unit), in odom."""
-        T_odom_tool = pin.updateFramePlacement(self._model, self._data, self._tool)
-        return T_odom_tool.translation.copy(), T_odom_tool.rotation[:, 2].copy()
+        """Position of the tool (3, m) and the direction in which the blades point (3, unit), in map."""
+        T_map_tool = self._where.pose_in_map(pin.updateFramePlacement(self._model, self._data, self._tool))
+        return T_map_tool.translation.copy(), T_map_tool.rotation[:, 2].copy()
+
+    def _placed(self, joint: int) -> Any:
+        """T_map_joint (pin.SE3)."""
+        return self._where.pose_in_map(self._data.oMi[joint])
 
     def rods(self) -> tuple[Capsule, ...]:
-        """The arm as rods from joint to joint (odom), to tell roughly what it hides."""
-        places = [self._data.oMi[joint].translation for joint in range(self._base + 1, self._model.njoints)]
+        """The arm as rods from joint to joint (map), to tell roughly what it hides."""
+        places = [self._placed(joint).translation for joint in range(self._base + 1, self._model.njoints)]
         places = [*(place for place in places if place[2] > _DECK), self.tool[0]]
         return tuple(
             Capsule("post", vector3(a), vector3(b), _ARM_RADIUS, _ARM_RADIUS)
@@ -97,11 +109,11 @@ class SceneRobot:
         )
 
     def triangles(self) -> Array:
-        """Every triangle of the robot as drawn now (n×3×3, m, odom)."""
+        """Every triangle of the robot as drawn now (n×3×3, m, map)."""
         transformed = []
         for part in self._parts:
-            T_odom_joint = self._data.oMi[part.joint]
-            vertices = part.vertices @ T_odom_joint.rotation.T + T_odom_joint.translation
+            T_map_joint = self._placed(part.joint)
+            vertices = part.vertices @ T_map_joint.rotation.T + T_map_joint.translation
             transformed.append(vertices[part.faces])
         triangles: Array = np.concatenate(transformed)
         return triangles
@@ -209,7 +221,7 @@ class ToolTrail:
         self._positions: deque[m.Vector3] = deque(maxlen=_TRAIL_POINTS)
 
     def extend(self, position: m.Vector3) -> bool:
-        """Add the tool's position (m, odom); True when the trail has grown."""
+        """Add the tool's position (m, map); True when the trail has grown."""
         if self._positions and float(np.linalg.norm(np.subtract(position, self._positions[-1]))) < _TRAIL_STEP:
             return False
         self._positions.append(position)

@@ -11,6 +11,7 @@ from rolling_panda.messages.page import CameraPreset, Layer, PagePoint
 from rolling_panda.messages.perception import Capsule, Obstacles, Scenery, UndecidedSite
 from rolling_panda.messages.supervision import GizmoAxes
 from rolling_panda.model.differential_drive import Array
+from rolling_panda.model.map_frame import MapFrame
 from server.scene.camera_view import DecodedFrame, draw_frustum, draw_point_cloud, remove_camera_view
 from server.scene.cameras import SceneCameras
 from server.scene.cut_canes import (
@@ -195,7 +196,7 @@ class Scene:
         self._uncut = {row.point.point_id for row in points} - cuts.keys()
 
     def show_canes(self, canes: tuple[Line, ...]) -> None:
-        """Draw the perceived canes, by their axes (polylines in odom from the base on, m), up to their cuts."""
+        """Draw the perceived canes, by their axes (polylines in map from the base on, m), up to their cuts."""
         if canes != self._canes:
             self._canes = canes
             self._draw_canes()
@@ -257,7 +258,7 @@ class Scene:
         self.markers.step(now)
 
     def show_gizmo(self, owner: str, tool: m.Pose, axes: GizmoAxes = "tool") -> None:
-        """Show the gizmo of `owner` at the tool (pose in odom), along these axes."""
+        """Show the gizmo of `owner` at the tool (pose in map), along these axes."""
         self.gizmos.show(owner, tool, self._clients(owner), axes)
 
     def show_ghost(self, owner: str, time: float | None) -> None:
@@ -275,10 +276,10 @@ class Scene:
         else:
             self._clicks.stop(owner)
 
-    def place_camera(self, owner: str, preset: CameraPreset, q: Array) -> None:
-        """Move the cameras of the views of `owner` to a preset; robot at q (12)."""
-        self.robot.move(q)
-        self.cameras.apply_preset(preset, self._clients(owner), q, *self.robot.tool)
+    def place_camera(self, owner: str, preset: CameraPreset, q: Array, where: MapFrame) -> None:
+        """Move the cameras of the views of `owner` to a preset; arguments as of `move`."""
+        self.robot.move(q, where)
+        self.cameras.apply_preset(preset, self._clients(owner), where.configuration_in_map(q), *self.robot.tool)
 
     def show_layers(self, owner: str, layers: Collection[Layer]) -> None:
         """Show `owner` these layers and no others."""
@@ -295,7 +296,7 @@ class Scene:
         return any(self._layers_of(owner) & {"camera", "cloud"} for owner in owners if owner is not None)
 
     def show_camera_frame(self, frame: DecodedFrame, wxyz: Array, position: Array) -> None:
-        """Draw a frame of the eye-in-hand camera, taken from a pose in odom, on the views that show it."""
+        """Draw a frame of the eye-in-hand camera, taken from a pose in map, on the views that show it."""
         for client_id, client in self._server.get_clients().items():
             owner = self.views.owner(client_id)
             layers = frozenset[Layer]() if owner is None else self._layers_of(owner)
@@ -312,7 +313,7 @@ class Scene:
             self._distance_tool.stop(owner, self._clients(owner))
 
     def measure(self, owner: str, origin: Array, direction: Array) -> tuple[PickedPoint, PickedPoint] | None:
-        """`owner` clicked along a ray (odom); returns both points after every second click."""
+        """`owner` clicked along a ray (map); returns both points after every second click."""
         ray, layers = Ray(origin, direction), self._layers_of(owner)
         rods = [rod for rows in self._plant.values() for rod in rows if "plant" in layers]
         rods += [rod for rows in self._rods.values() for rod in rows if "simulated" in layers]
@@ -330,11 +331,17 @@ class Scene:
         self.gizmos.hide(owner)
         self._clicks.stop(owner)
 
-    def move(self, q: Array) -> bool:
-        """Show the robot at q (12); True when something was sent."""
-        self.gizmos.heading = float(q[2])
-        moved = self.robot.move(q)
-        self.cameras.follow(q, self.robot.tool[0])
+    def move(self, q: Array, where: MapFrame) -> bool:
+        """Show the robot as measured; True when something was sent.
+
+        Args:
+            q: Configuration (12), with the base in odom.
+            where: Where odom is in map.
+        """
+        in_map = where.configuration_in_map(q)
+        self.gizmos.heading = float(in_map[2])
+        moved = self.robot.move(q, where)
+        self.cameras.follow(in_map, self.robot.tool[0])
         return moved
 
     def close(self) -> None:

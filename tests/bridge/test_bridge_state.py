@@ -516,4 +516,4 @@ def test_scenery_tells_its_rods_in_odom() -> None:
     rod = Capsule(start=(0.0, 0.0, 0.0), end=(0.0, 0.0, 1.0), start_radius=0.1, end_radius=0.1, kind="post")
     core = BridgeCore(IdealRobot(), BridgeConfig(), MODEL.limits, odometer(), "sim", scenery=lambda: (1, (rod,)))
     scenery = core.step(7.5).scenery
-    assert scenery is not None and (scenery.header.frame_id, scenery.capsules) == ("odom", (rod,))
+    assert scenery is not None and (scenery.header.frame_id, scenery.capsules) == ("map", (rod,))

@@ -1,10 +1,13 @@
 import numpy as np
+import pinocchio as pin
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from controller.config import WorkConfig
 from controller.work.posture_search import cut_poses, escape_pose
 from rolling_panda.errors import InputError
+from rolling_panda.model.map_frame import MapFrame
 
 LEFT = np.array([0.0, 1.0, 0.0])
 POINT = np.array([1.0, 0.85, 1.0])
@@ -47,16 +50,32 @@ def test_a_cane_that_points_at_the_robot_is_refused():
         cut_poses(POINT, LEFT, LEFT, 0.15, 0.25)
 
 
-@given(st.floats(-0.9, 0.9), st.floats(0.01, 0.3))
-def test_escape_leads_out_by_the_depth_without_turning(azimuth, depth):
-    pose = cut_poses(POINT, np.array([0.0, 0.0, 1.0]), LEFT, 0.15, 0.25, azimuth).cut
-    out = escape_pose(pose, LEFT, depth)
-    assert (pose.translation - out.translation) @ LEFT == pytest.approx(depth)
-    np.testing.assert_array_equal(out.rotation, pose.rotation)
+WORK = WorkConfig()
+#: How far from the robot's path the tool counts as clear of the canes (m).
+DEEPER = 0.03
+CLEAR = WORK.row_distance - WORK.clearance + DEEPER
+drifts = st.builds(
+    lambda x, y, turn, tilt: MapFrame(pin.SE3(pin.rpy.rpyToMatrix(tilt, 0.0, turn), np.array([x, y, 0.01]))),
+    st.floats(-2.0, 2.0), st.floats(-0.5, 0.5), st.floats(-0.3, 0.3), st.floats(-0.03, 0.03),
+)  # fmt: skip
+
+
+@given(st.floats(-0.9, 0.9), st.floats(0.01, 0.3), drifts)
+def test_escape_leads_out_of_the_row_without_turning_wherever_odom_has_drifted(azimuth, depth, frame):
+    among = np.array([1.0, CLEAR + depth, 1.0])
+    pose = frame.pose_in_odom(cut_poses(among, np.array([0.0, 0.0, 1.0]), LEFT, 0.15, 0.25, azimuth).cut)
+    out = escape_pose(WORK, pose, frame, DEEPER)
+    assert frame.pose_in_map(out).translation[1] == pytest.approx(CLEAR)
+    np.testing.assert_allclose(out.rotation, pose.rotation, atol=1e-12)
 
 
 def test_escape_of_a_tool_that_points_elsewhere_is_square_to_the_row():
-    pose = cut_poses(POINT, np.array([0.0, 0.0, 1.0]), LEFT, 0.15, 0.25, 0.0).cut
+    pose = cut_poses(np.array([1.0, CLEAR + 0.1, 1.0]), np.array([0.0, 0.0, 1.0]), LEFT, 0.15, 0.25, 0.0).cut
     pose.rotation = pose.rotation @ np.array([[0, 0, -1.0], [0, 1, 0], [1, 0, 0]])
-    out = escape_pose(pose, LEFT, 0.1)
+    out = escape_pose(WORK, pose, MapFrame(), DEEPER)
     np.testing.assert_allclose(out.translation, pose.translation - 0.1 * LEFT)
+
+
+def test_a_tool_that_is_clear_of_the_canes_needs_no_escape():
+    pose = cut_poses(np.array([1.0, CLEAR - 0.01, 1.0]), np.array([0.0, 0.0, 1.0]), LEFT, 0.15, 0.25).cut
+    assert escape_pose(WORK, pose, MapFrame(), DEEPER) is None

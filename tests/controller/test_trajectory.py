@@ -95,7 +95,7 @@ places = st.tuples(*[st.floats(-0.01, 0.01)] * 3)
 
 @given(places, st.floats(0.0, 5.0))
 def test_it_keeps_its_bounds_and_is_all_there_at_its_end(by, begin):
-    made = Correction.within(begin, np.array(by), RATES)
+    made = Correction.within(begin, np.array(by), np.zeros(2), RATES)
     size, dt = float(np.linalg.norm(by)), made.duration / 1000
     times = begin + np.arange(-10, 1011) * dt
     way = size * np.array([made.progress(time).s for time in times])

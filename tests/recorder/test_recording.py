@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+import numpy as np
+import pinocchio as pin
 import pytest
 from mcap.reader import make_reader
 from mcap.writer import Writer
@@ -17,6 +19,7 @@ from rolling_panda import messages as m
 from rolling_panda import topics
 from rolling_panda.errors import InputError
 from rolling_panda.messages.robot import CameraFrame, Intrinsics
+from tests.support.fake_wire import located
 
 BEGAN = 1_800_000_000_000_000_000
 FRAME = CameraFrame(
@@ -87,7 +90,9 @@ def test_every_schema_is_one_that_a_viewer_reads(kind: type[m.Message]) -> None:
 
 
 def test_what_views_show_is_what_their_schema_says() -> None:
-    for channel, message in ((CHANNELS[m.Odometry], odometry(3)), (CHANNELS[CameraFrame], FRAME)):
+    drift = located(pin.SE3(np.eye(3), np.array([0.1, 0.0, 0.0])))
+    for message in (odometry(3), drift, FRAME):
+        channel = CHANNELS[type(message)]
         shown = channel.convert(message, BEGAN)
         assert shown is not None and set(shown) == set(channel.schema["properties"])
 

@@ -5,6 +5,7 @@ import shutil
 from types import SimpleNamespace
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from PIL import Image
 
@@ -12,7 +13,9 @@ from rolling_panda import cut_pictures
 from rolling_panda import messages as m
 from rolling_panda.cut_pictures import CloseUps, CutCloseUp, PictureFolder, box_of, cropped
 from rolling_panda.messages.robot import Intrinsics
+from rolling_panda.model.map_frame import MapFrame
 from rolling_panda.model.robot import RobotModel, configuration
+from rolling_panda.model.wire_values import vector3
 from tests.support.fake_wire import ARM
 from tests.support.fake_wire import HEADER as HEAD
 
@@ -87,6 +90,9 @@ def test_the_cut_is_in_the_middle_of_its_picture():
     with Image.open(io.BytesIO(cropped(frame.color_jpeg, box))) as picture:
         red = np.argwhere(np.asarray(picture)[:, :, 0] > 200).mean(axis=0)
         assert np.allclose(red, (picture.height / 2, picture.width / 2), atol=1.5)
+    drift = pin.SE3(pin.exp3(np.array([0.0, 0.0, 0.2])), np.array([1.0, 0.2, 0.0]))
+    in_map = vector3(drift.act(np.array(place)))
+    assert box_of(CutCloseUp("c1", "before", frame, in_map, MapFrame(drift)), model) == box
     behind = tuple(camera.translation - camera.rotation @ np.array([0.0, 0.0, 0.4]))
     aside = tuple(camera.translation + camera.rotation @ np.array([2.0, 0.0, 0.4]))
     for hidden in (behind, aside):

@@ -1,5 +1,6 @@
 import msgspec
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from rolling_panda import messages as m
@@ -7,7 +8,8 @@ from rolling_panda import reasons, topics
 from rolling_panda.messages.page import PagePlan
 from rolling_panda.messages.robot import CameraFrame, Intrinsics, JointState
 from rolling_panda.messages.supervision import PointPlan, SessionPlan
-from rolling_panda.model.robot import RobotModel, configuration
+from rolling_panda.model.map_frame import MapFrame
+from rolling_panda.model.robot import RobotModel, configuration, placement
 from server.robots.link import RobotLink
 from server.robots.page_view import PageView, project, speed_ratios
 from tests.support.fake_wire import (
@@ -17,12 +19,13 @@ from tests.support.fake_wire import (
     bridge_state,
     controller_state,
     joints,
+    located,
     odometry,
     pruning_point,
     pruning_points,
 )
 
-MODEL = RobotModel()
+MODEL, HERE = RobotModel(), MapFrame()
 
 
 @pytest.fixture
@@ -50,17 +53,31 @@ def in_camera(x, y, z):
 
 
 def test_a_point_on_the_optical_axis_is_at_the_principal_point():
-    assert project([in_camera(0.0, 0.0, 0.8)], frame(), MODEL) == [(320.0, 240.0)]
+    assert project([in_camera(0.0, 0.0, 0.8)], frame(), MODEL, HERE) == [(320.0, 240.0)]
 
 
 def test_right_and_down_in_the_camera_are_right_and_down_in_the_image():
-    assert project([in_camera(0.1, 0.05, 0.6)], frame(), MODEL) == [(420.0, 290.0)]
+    assert project([in_camera(0.1, 0.05, 0.6)], frame(), MODEL, HERE) == [(420.0, 290.0)]
+
+
+def test_a_point_in_map_is_where_the_camera_sees_it_though_odom_has_drifted(wire, view):
+    drift = pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.02, 0.1), np.array([0.4, -0.1, 0.01]))
+    place = tuple(float(value) for value in drift.act(np.array(in_camera(0.1, 0.05, 0.6))))
+    assert project([place], frame(), MODEL, MapFrame(drift)) == [(420.0, 290.0)]
+    wire.deliver(topics.JOINTS, joints(), at=10.0)
+    wire.deliver(topics.ODOMETRY, odometry(x=0.5), at=10.0)
+    before = placement(view.tool(10.0))
+    wire.deliver(topics.LOCALISATION, located(drift), at=10.0)
+    np.testing.assert_allclose(placement(view.tool(10.0)).homogeneous, (drift * before).homogeneous, atol=1e-9)
+    wire.deliver(topics.POINTS, pruning_points(pruning_point("p1", position=place)), at=10.0)
+    wire.deliver(topics.CAMERA, frame(), at=10.0)
+    assert view.points(10.0).points[0].pixel == (420.0, 290.0)
 
 
 def test_what_is_behind_or_beside_the_image_has_no_pixel():
     places = [in_camera(0.0, 0.0, -0.5), in_camera(1.0, 0.0, 0.5)]
-    assert project(places, frame(), MODEL) == [None, None]
-    assert project(places, None, MODEL) == [None, None]
+    assert project(places, frame(), MODEL, HERE) == [None, None]
+    assert project(places, None, MODEL, HERE) == [None, None]
 
 
 def test_everything_ages_and_nothing_disappears(wire, view):

@@ -3,14 +3,18 @@
 import math
 
 import msgspec
+import numpy as np
+import pinocchio as pin
 import pytest
 
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.messages.supervision import PreviewState
+from rolling_panda.model.map_frame import MapFrame
 from server.api.preview import outdated
 from server.robots.link import Posture
 
+HERE = MapFrame()
 ARM = (0.0, -0.5, 0.0, -2.0, 0.0, 1.5, 0.8)
 STATE = PreviewState(
     header=m.Header(),
@@ -23,12 +27,18 @@ STATE = PreviewState(
 )
 
 
-def posture(x=1.0, phi=0.0, wheels=3.0, first=0.0):
-    return Posture(m.PlanarPose(x, 0.0, phi), (wheels, wheels, first, *ARM[1:]), 0.01)
+def posture(x=1.0, phi=0.0, wheels=3.0, first=0.0, where=HERE):
+    return Posture(m.PlanarPose(x, 0.0, phi), (wheels, wheels, first, *ARM[1:]), 0.01, where)
 
 
 def test_what_is_as_it_was_passes_however_far_the_wheels_have_turned():
     assert outdated(STATE, STATE.preview_hash, posture(x=1.04, phi=0.04, wheels=30.0, first=0.09)) is None
+
+
+def test_a_preview_in_the_row_passes_where_odom_has_drifted_and_the_robot_has_not_moved():
+    drift = MapFrame(pin.SE3(np.eye(3), np.array([-0.6, 0.0, 0.0])))
+    assert outdated(STATE, STATE.preview_hash, posture(x=1.6, where=drift)) is None
+    assert outdated(STATE, STATE.preview_hash, posture(x=1.0, where=drift)).code == "preview_base_moved"
 
 
 @pytest.mark.parametrize(

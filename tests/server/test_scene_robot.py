@@ -4,14 +4,16 @@ from contextlib import nullcontext
 from types import SimpleNamespace
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from rolling_panda import messages as m
 from rolling_panda.messages.supervision import PreviewRow
+from rolling_panda.model.map_frame import MapFrame
 from rolling_panda.model.robot import RobotModel, configuration
 from server.scene.robot import SceneRobot, ToolTrail, configuration_at
 
-MODEL = RobotModel().model
+MODEL, HERE = RobotModel().model, MapFrame()
 ARM = (0.1, -0.4, 0.2, -1.9, 0.0, 1.6, 0.8)
 
 
@@ -38,22 +40,32 @@ def posture(x=0.0, y=0.0, theta=0.0, arm=ARM):
 
 def test_a_robot_that_stands_still_is_sent_once_whatever_odometry_wanders(robot):
     chance = np.random.default_rng(4)
-    assert robot.move(posture())
+    assert robot.move(posture(), HERE)
     for x, y, theta in chance.normal(0.0, 3e-4, (200, 3)).clip(-9e-4, 9e-4):
-        assert not robot.move(posture(x, y, theta))
+        assert not robot.move(posture(x, y, theta), HERE)
 
 
 def test_what_it_creeps_adds_up(robot, frames):
-    robot.move(posture())
+    robot.move(posture(), HERE)
     for step in range(1, 101):
-        robot.move(posture(x=1e-4 * step))
+        robot.move(posture(x=1e-4 * step), HERE)
     assert frames["/robot"].position[0] == pytest.approx(0.01, abs=1e-3)
 
 
+def test_a_robot_whose_odometry_has_drifted_stands_where_it_is_in_the_row(robot, frames):
+    robot.move(posture(x=1.0), HERE)
+    tool, ahead = robot.tool
+    drift = pin.SE3(pin.exp3(np.array([0.0, 0.02, 0.1])), np.array([-0.2, 0.05, 0.01]))
+    robot.move(posture(x=1.0), MapFrame(drift))
+    assert frames["/robot"].position == pytest.approx(drift.act(np.array([1.0, 0.0, 0.0])), abs=1e-9)
+    assert robot.tool[0] == pytest.approx(drift.act(tool)) and robot.tool[1] == pytest.approx(drift.rotation @ ahead)
+    assert robot.rods()[-1].end == pytest.approx(robot.tool[0])
+
+
 def test_a_joint_that_turns_a_little_is_sent_and_no_other(robot, frames):
-    robot.move(posture())
+    robot.move(posture(), HERE)
     before = {name: frame.wxyz for name, frame in frames.items()}
-    assert robot.move(posture(arm=(ARM[0] + 1e-3, *ARM[1:])))
+    assert robot.move(posture(arm=(ARM[0] + 1e-3, *ARM[1:])), HERE)
     assert [name for name, frame in frames.items() if frame.wxyz is not before[name]] == [
         name for name in frames if name.endswith("panda_joint1")
     ]

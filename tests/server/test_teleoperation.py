@@ -3,6 +3,8 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
+import numpy as np
+import pinocchio as pin
 import pytest
 
 from rolling_panda import messages as m
@@ -20,7 +22,7 @@ from server.scene.scene import Scene
 from server.scene.solids import build_solids
 from server.scene.viser_adapter.client_messages import GizmoDragEnd, GizmoUpdate
 from tests.server.test_misuse import control
-from tests.support.fake_wire import FakeWire, joints, odometry
+from tests.support.fake_wire import FakeWire, joints, located, odometry
 
 MODEL = RobotModel()
 DRIVE = TeleopCommand(base=BaseVelocity(0.1, 0.0))
@@ -142,6 +144,21 @@ def test_where_a_drag_ends_after_the_hold_is_forgotten(hands: Hands) -> None:
     hands.hold(ANN)
     hands.teleop.step(hands.now)
     assert hands.sent[-1].target == tool
+
+
+def test_the_gizmo_is_in_the_row_and_its_target_where_odom_has_drifted_to(hands: Hands) -> None:
+    drift = pin.SE3(pin.exp3(np.array([0.0, 0.0, 0.1])), np.array([0.3, -0.05, 0.02]))
+    hands.wire.deliver(topics.LOCALISATION, located(drift))
+    hands.teleop.show_gizmo(ANN)
+    hands.hold(ANN)
+    hands.drag(ANN, 0.4)
+    (target,) = hands.sent
+    assert target.target is not None
+    assert target.target.position == pytest.approx(drift.actInv(np.array([0.4, 0.5, 0.9])))
+    hands.now += 0.1
+    hands.hold(ANN)
+    hands.teleop.step(hands.now)
+    assert hands.sent[-1].target == target.target
 
 
 def test_the_end_of_a_drag_while_holding_changes_nothing(hands: Hands) -> None:

@@ -8,6 +8,8 @@ from functools import cache
 
 from rolling_panda import messages as m
 from rolling_panda import topics
+from rolling_panda.messages.perception import Localisation
+from rolling_panda.model.robot import pose_message
 from rolling_panda.reasons import said
 from rolling_panda.transport.codec import StrictDecoder, encode
 from rolling_panda.transport.traffic import Traffic
@@ -99,6 +101,13 @@ def joints(sequence=1, arm=ARM):
 
 def odometry(sequence=1, x=0.0):
     return m.Odometry(header=HEADER, sequence=sequence, pose=m.PlanarPose(x, 0.0, 0.0), linear=0.0, angular=0.0)
+
+
+def located(T_map_odom):
+    """Perception's message of where odom (pin.SE3) is in map."""
+    return Localisation(
+        header=HEADER, state="located", T_map_odom=pose_message(T_map_odom), covariance=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    )
 
 
 def bridge_state(stop_id=""):

@@ -113,9 +113,9 @@ export interface PruningPoint {
   point_id: string;
   /** Increases when the cut changes: its kind, the nodes kept, or its place or tangent by more than noise. */
   revision: number;
-  /** Position on the cane's axis, in odom (m). */
+  /** Position on the cane's axis, in map (m). */
   position: Vector3;
-  /** Unit vector along the cane in odom, pointing away from the cordon. */
+  /** Unit vector along the cane in map, pointing away from the cordon. */
   tangent: UnitVector3;
   /** Radius of the cane (m). */
   radius: number;
@@ -165,7 +165,7 @@ export interface QueueEntry {
   user: string;
   /** Its last cut; empty before the first. */
   cut_id: string;
-  /** Position at acceptance, in odom (m). */
+  /** Position at acceptance, in map (m). */
   accepted_position: Vector3|null;
   /** Hash of the accepted point, see `PruningPoint.digest`. */
   digest: string;
@@ -350,7 +350,7 @@ export interface JointState {
   external_torque: ArmTorques|null;
 }
 
-/** Pose of base_link in odom, on the ground plane. */
+/** Pose of base_link on the ground plane; the field that contains it names the frame. */
 export interface PlanarPose {
   /** Forward (m). */
   x: number;
@@ -512,7 +512,7 @@ export interface PointPlan {
   order: number;
   /** Reason for the refusal; None otherwise. */
   reason: Reason|null;
-  /** Pose of base_link in odom at the cut; None for a refused point. */
+  /** Pose of base_link in map at the cut; None for a refused point. */
   base: PlanarPose|null;
   /** Figures of the motion to it and out again; None for a refused point, and for a later one until the work comes near it. */
   rollout: PreviewedCut|null;
@@ -542,7 +542,7 @@ export interface UndecidedSite {
   vine: number;
   /** Number of the spur on that vine; 0 for no particular spur. */
   spur: number;
-  /** Position of the spur in odom (m), if known. */
+  /** Position of the spur in map (m), if known. */
   position: Vector3|null;
 }
 
@@ -594,7 +594,7 @@ export interface PagePoints {
 /** Controller → all: state, figures and approval of the preview. */
 export interface PreviewState {
   type: "PreviewState";
-  /** `frame_id` is odom. */
+  /** `frame_id` is map. */
   header: Header;
   /** True if a cut needs an approved preview. */
   required: boolean;
@@ -606,7 +606,7 @@ export interface PreviewState {
   preview_hash: string;
   /** Name of the person who approved it; empty without an approval. */
   approved_by: string;
-  /** Pose of base_link in odom at the start. */
+  /** Pose of base_link in map at the start. */
   start: PlanarPose|null;
   /** Actuated coordinates at the start (rad). */
   position: Actuated|null;
@@ -658,16 +658,16 @@ export interface Selected {
 /** A click in the 3-D view while points are placed by hand. */
 export interface PickRay {
   type: "PickRay";
-  /** Origin of the pick ray in odom (m). */
+  /** Origin of the pick ray in map (m). */
   origin: Vector3;
-  /** Unit direction of the pick ray in odom. */
+  /** Unit direction of the pick ray in map. */
   direction: UnitVector3;
 }
 
 /** Result of a measurement between two clicks in the 3-D view. */
 export interface Measured {
   type: "Measured";
-  /** Second position minus the first, in odom (m). */
+  /** Second position minus the first, in map (m). */
   offset: Vector3;
   /** Names of the clicked objects. */
   between: [string, string];
