@@ -1,17 +1,26 @@
 """Pictures of the page: small, of the part that matters, and one of every state for the documents that show them."""
 
 import re
+import signal
+import subprocess
+import time
+from contextlib import suppress
 from pathlib import Path
 
+import httpx
 import numpy as np
+import psutil
 import pytest
 from PIL import Image
 from playwright.sync_api import Page
 
 from benchmarks.page import pictures
 from rolling_panda.errors import InputError
+from rolling_panda.runtime.launch import child_environment, python_command
 from tests.support.page_states import STATES
 from tests.support.played_page import box_of
+from tests.support.processes.local_router import free_port
+from tests.support.waiting import until
 
 FOLDER = pictures.ROOT / "docs/images/page"
 
@@ -57,3 +66,30 @@ def test_without_the_tests_it_says_what_is_missing(tmp_path: Path, monkeypatch: 
     monkeypatch.setattr(pictures, "ROOT", tmp_path)
     with pytest.raises(InputError, match="in a checkout of the project"):
         pictures.played(pytest.fail, pictures.Album(tmp_path), ())
+
+
+@pytest.mark.browser
+@pytest.mark.processes
+def test_ended_while_its_demo_starts_it_leaves_nothing_behind(tmp_path: Path) -> None:
+    port = str(free_port())
+    words = ["pictures", "--part", "live", "--out", str(tmp_path), "--port", port]
+    bench = subprocess.Popen(python_command("benchmarks", words), env=child_environment(), stderr=subprocess.DEVNULL)
+    started: list[psutil.Process] = []
+
+    def serves() -> bool:
+        time.sleep(0.2)
+        started[:] = psutil.Process(bench.pid).children(recursive=True)
+        with suppress(httpx.TransportError):
+            return httpx.get(f"http://127.0.0.1:{port}/sign-in").is_success
+        return False
+
+    try:
+        until(serves, 120.0)
+        # It alone, as another program would, and not all processes of a terminal.
+        bench.send_signal(signal.SIGINT)
+        bench.wait(30.0)
+        assert psutil.wait_procs(started, timeout=10.0)[1] == []
+    finally:
+        for each in (bench, *started):
+            if each.poll() is None if isinstance(each, subprocess.Popen) else each.is_running():
+                each.kill()

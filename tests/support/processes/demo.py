@@ -145,6 +145,16 @@ class Demo(DemoProcess):
         super().__init__(port, "--seed", str(seed), *more, *chosen)
         self.tree = psutil.Process(self.pid)
         self.client = httpx.Client(base_url=self.url, headers={"Origin": self.url}, timeout=10)
+        #: Who holds each robot.
+        self.scripts = [self.client]
+        try:
+            self._sign_in()
+        except BaseException:
+            # Nobody has it yet who could close it.
+            self.close()
+            raise
+
+    def _sign_in(self) -> None:
         self.wait_until_up(180.0)
         token = re.search(r"/sign-in\?token=(\S+)", self.text())
         wire = re.search(r"--connect (\S+) --certificates (\S+)", self.text())
@@ -155,8 +165,6 @@ class Demo(DemoProcess):
         several = self.client.get("/api/robots")
         #: Below which each robot's requests are.
         self.paths = [row["path"].rstrip("/") for row in several.json()] if several.is_success else [""]
-        #: Who holds each robot.
-        self.scripts = [self.client]
         for number in range(1, len(self.paths)):
             cookie = self.guest(f"script-{number + 1}", "supervisor")
             self.scripts.append(
