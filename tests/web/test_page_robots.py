@@ -14,7 +14,7 @@ from server.robots.summary import RobotSummary
 from tests.support.axe import axe, grave
 from tests.support.page_host import PlayedRequest, PlayedSocket, page_host
 from tests.support.page_parts import choose, open_screen
-from tests.support.played_page import opened, until
+from tests.support.played_page import box_of, opened, until
 from tests.support.played_server import ORIGIN, PlayedServer, controller, page_file, point
 
 __all__ = ["axe"]
@@ -142,6 +142,18 @@ def test_the_other_robot_is_seen_and_chosen_and_nothing_reaches_the_wrong_one(pa
     hall.online = False
     expect(page.locator("rp-robots")).to_have_class("panel stale")
     expect(second).to_be_visible()
+
+
+def test_a_notice_of_another_robot_hides_none_of_them(pages: Page, hall: PlayedHall) -> None:
+    page = pages
+    hall.alarms["panda-2"] = reasons.robot_stopped(reasons.said("by Bob"))
+    expect(page.locator("rp-toasts .toast")).to_be_visible()
+    for width, height in ((1280, 800), (1024, 768), (844, 390), (390, 844)):
+        page.set_viewport_size({"width": width, "height": height})
+        toast, robots = (box_of(page.locator(part)) for part in ("rp-toasts .toast", "rp-robots ul"))
+        assert toast["y"] >= robots["y"] + robots["height"], (width, height)
+        assert toast["y"] < robots["y"] + robots["height"] + 24, (width, height)
+        assert toast["x"] >= 0 and toast["x"] + toast["width"] <= width
 
 
 def test_the_picker_is_for_fingers_keys_and_those_who_do_not_see_it(pages: Page, hall: PlayedHall, axe: str) -> None:
