@@ -8,6 +8,7 @@ import { points } from "../js/state/page-state.js";
 import { reasonText } from "../js/state/reasons.js";
 import { screen, whileOpen } from "../js/state/screens.js";
 import { drawOn } from "../js/state/signals.js";
+import { sessionEnd } from "../js/state/timeline.js";
 import { counted, joined, labelOf, text } from "../js/state/texts.js";
 import { dropDown, element, setEnabled, setText } from "../js/views/dom.js";
 import { icon } from "../js/views/icons.js";
@@ -76,7 +77,7 @@ class RpReport extends HTMLElement {
     try {
       const response = await fetch("api/report", { credentials: "same-origin", signal: AbortSignal.timeout(4000) });
       const body = await response.json();
-      if (response.ok) this.show(body);
+      if (response.ok) this.show(body, sessionEnd(response, body.written_at));
       else setText(this.words, text("report.old", { why: reasonText(reasonIn(body)) }));
     } catch {
       setText(this.words, text("report.unreachable"));
@@ -92,12 +93,15 @@ class RpReport extends HTMLElement {
     window.print();
   }
 
-  /** @param {SessionReport} report */
-  show(report) {
+  /**
+   * @param {SessionReport} report
+   * @param {number} until End of the session, or now (s since 1970).
+   */
+  show(report, until) {
     const older = report.cut_count - report.cuts.length;
     const since = report.began_at > 0 ? text("report.since", { time: clockWords(report.began_at) }) : text("report.nothing");
     setText(this.words, [since, ...(older > 0 ? [counted("report.older", older)] : [])].join(" "));
-    this.showSums(report);
+    this.showSums(report, until);
     this.showCuts(report.cuts);
     this.vines.show(
       report.vines.map((vine) => [
@@ -115,8 +119,11 @@ class RpReport extends HTMLElement {
     this.control.show([...report.control].reverse().map((each) => [clockWords(each.at), each.user, text(`report.${each.asked}`)]));
   }
 
-  /** @param {SessionReport} report */
-  showSums({ began_at, written_at, cuts, vines, refusal_count }) {
+  /**
+   * @param {SessionReport} report
+   * @param {number} until
+   */
+  showSums({ began_at, cuts, vines, refusal_count }, until) {
     const accepted = [...new Set(cuts.map((cut) => cut.user).filter(Boolean))].sort();
     const ended = cuts.filter((cut) => cut.ended_at > 0).length;
     const seconds = cuts.reduce((sum, cut) => sum + cut.seconds, 0);
@@ -125,7 +132,7 @@ class RpReport extends HTMLElement {
     const count = (/** @type {"done"|"not_cut"|"unknown"|"unreachable"} */ name) => vines.reduce((sum, vine) => sum + vine[name], 0);
     list(this.facts, [
       ["date", began_at > 0 ? dateWords(began_at) : "–"],
-      ["duration", began_at > 0 ? spanWords(written_at - began_at) : "–"],
+      ["duration", began_at > 0 ? spanWords(until - began_at) : "–"],
       ["at_work", spanWords(atWork)],
       ["user", accepted.join(", ") || "–"],
     ]);

@@ -1,6 +1,6 @@
 // The timeline of the session, or of the recording that is replayed.
 
-import { pageState } from "./page-state.js";
+import { isGone, pageState } from "./page-state.js";
 import { signal } from "./signals.js";
 
 /** @typedef {import("../link/messages.js").Timeline} Timeline */
@@ -17,13 +17,22 @@ export async function fetchTimeline() {
     if (!response.ok) return;
     /** @type {Timeline} */
     const told = await response.json();
-    // By the server's clock: that of a tablet may be wrong.
-    const now = Date.parse(response.headers.get("date") ?? "") / 1000;
-    const goesOn = !pageState.get()?.replay && told.began_at > 0 && now > told.ended_at;
-    timeline.set(goesOn ? { ...told, ended_at: now } : told);
+    timeline.set(told.began_at > 0 ? { ...told, ended_at: sessionEnd(response, told.ended_at) } : told);
   } catch {
     // Asked again soon.
   }
+}
+
+/**
+ * Until when the session lasts (s since 1970): now while it goes on, else until its last record.
+ *
+ * @param {Response} response An answer of the server. Its clock counts: that of a tablet may be wrong.
+ * @param {number} recorded Time of the last record (s since 1970).
+ */
+export function sessionEnd(response, recorded) {
+  if (pageState.get()?.replay || isGone("controller")) return recorded;
+  const now = Date.parse(response.headers.get("date") ?? "") / 1000;
+  return now > recorded ? now : recorded;
 }
 
 /**
