@@ -262,6 +262,7 @@ class Controller:
             intents.Resume: self._change_mode,
             intents.Acknowledge: self._change_mode,
             intents.Start: self._start,
+            intents.Continue: self._continue,
             intents.Survey: self._survey,
             intents.LookAgain: self._look_again,
             intents.CalibrateCamera: functools.partial(self._look_around, CALIBRATION),
@@ -333,6 +334,7 @@ class Controller:
         supervisor, queue, previews = self._supervisor, self._queue, self._previews
         work: dict[Condition, m.Reason | None] = {
             "workable point": queue.waits,
+            "interrupted work": self._continue_refused(),
             "acceptable point": queue.none_acceptable(),
             "voided acceptances": queue.undo_refused,
             "order by hand": queue.order.reset_refused,
@@ -342,19 +344,37 @@ class Controller:
         }
         return supervisor.situation(work, now, intent)
 
-    def _change_mode(self, asked: intents.Intent, now: float) -> m.Reason | None:
-        """Process the command's event. A client that moves a robot without a holder gets control."""
+    def _continue_refused(self) -> m.Reason | None:
+        """Why there is nothing to go on with; None if there is."""
+        match self._supervisor.interrupted:
+            case "work":
+                return self._queue.waits or self._previews.start_refused()
+            case "survey":
+                return None
+            case _:
+                return reasons.nothing_interrupted()
+
+    def _change_mode(self, asked: intents.Intent, now: float, event: Event | None = None) -> m.Reason | None:
+        """Process an event, the command's own as a rule. A client that moves a robot without a holder gets control."""
         command, authority = COMMAND_OF[type(asked)], self._supervisor.authority
         client = client_of(asked)
         if command.control:
             authority.claim(client, now)
-        if command.event is None:
+        caused = event or command.event
+        if caused is None:
             return None
         reason = reasons.command_by(command.words, asked.user)
-        return self._supervisor.event(command.event, now, reason, authority.rights(client, asked.role))
+        return self._supervisor.event(caused, now, reason, authority.rights(client, asked.role))
 
     def _start(self, asked: intents.Start, now: float) -> m.Reason | None:
         return self._begin(asked, now, self._movement.sequence.start)
+
+    def _continue(self, asked: intents.Continue, now: float) -> m.Reason | None:
+        surveying, sequence = self._supervisor.interrupted == "survey", self._movement.sequence
+        refused = self._movement.home_refused() if surveying else None
+        if refused is None and self.mode == "PAUSED":
+            refused = self._change_mode(asked, now, Event.RESUME)
+        return refused or self._begin(asked, now, sequence.continue_survey if surveying else sequence.start)
 
     def _survey(self, asked: intents.Survey, now: float) -> m.Reason | None:
         survey = functools.partial(self._movement.sequence.survey, asked.distance)
@@ -379,8 +399,8 @@ class Controller:
         self._calibration_due = m.UseCalibration(user=asked.user, base=base)
         return None
 
-    def _begin(self, asked: intents.Start, now: float, work: Callable[[], None]) -> m.Reason | None:
-        refused = self._change_mode(asked, now)
+    def _begin(self, asked: intents.Intent, now: float, work: Callable[[], None]) -> m.Reason | None:
+        refused = self._change_mode(asked, now, Event.START)
         if refused is None:
             self._previews.start()
             work()

@@ -3,7 +3,7 @@
 from controller.config import ControllerConfig
 from controller.motion.follower import Measured, Tracking
 from controller.supervision.modes import State
-from controller.supervision.permission import of_holder
+from controller.supervision.permission import OF_SUPERVISOR, of_holder
 from controller.whole_body.collision import Clearance
 from controller.whole_body.joint_limits import margin
 from controller.whole_body.manipulability import arm_omega
@@ -72,6 +72,7 @@ def controller_state(
         reason=reasons.held_back(held) if held else waits or state.reason,
         allowed=allowed,
         of_holder=of_holder(state.mode),
+        of_supervisor=OF_SUPERVISOR[state.mode],
         active_point_id=active if state.mode == "AUTO" else "",
         method=config.whole_body.method,
         T_odom_tool=None if measured is None else pose_message(measured.kinematics.T_odom_tool),

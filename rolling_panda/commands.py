@@ -392,6 +392,10 @@ class Resume(Intent, frozen=True, kw_only=True):
     """PAUSED → READY. Work does not start."""
 
 
+class Continue(Start, frozen=True, kw_only=True):
+    """PAUSED or READY → AUTO. Go on with the work or the survey that was interrupted."""
+
+
 class Home(Intent, frozen=True, kw_only=True):
     """READY: move the arm to its survey posture beside the row."""
 
@@ -477,6 +481,7 @@ Condition = Literal[
     "at rest",
     "workable point",
     "approved preview",
+    "interrupted work",
     "perception",
     "watched",
     "acceptable point",
@@ -587,6 +592,14 @@ COMMANDS: Final[tuple[Command, ...]] = (
     Command(UseBase, "mode", "/base/use", modes=("IDLE", "READY", "PAUSED")),
     Command(Pause, "mode", "/pause", event=Event.PAUSE),
     Command(Resume, "mode", "/resume", control=True, event=Event.RESUME),
+    Command(
+        Continue,
+        "mode",
+        "/continue",
+        control=True,
+        modes=("READY", "PAUSED"),
+        conditions=("interrupted work", *_WATCHED_MOTION),
+    ),
     Command(
         Home,
         "mode",

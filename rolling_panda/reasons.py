@@ -381,6 +381,11 @@ def impossible_in_paused(event: str) -> None:
     """{event} is not possible while the robot is paused."""
 
 
+@_reason("warning", "press Start or Survey")
+def nothing_interrupted() -> None:
+    """No work and no survey was interrupted."""
+
+
 @_reason("warning", "press I've checked first")
 def impossible_in_protective_stop(event: str) -> None:
     """{event} is not possible during a protective stop."""
@@ -960,13 +965,8 @@ def hold_again() -> None:
 
 
 @_reason("info", "")
-def survey_on() -> None:
-    """Press Survey to look on."""
-
-
-@_reason("info", "")
-def survey_on_or_start() -> None:
-    """Press Survey to look on, or Start to cut."""
+def resume_survey() -> None:
+    """When that is seen to, press Resume: the survey goes on."""
 
 
 @_reason("info", "")

@@ -103,6 +103,12 @@ def step(state: State, event: Event, now: float, reason: Reason, by: Rights = SY
     return Transition(state if row is None or refused is not None else State(row.after, reason), refused)
 
 
+def who(mode: Mode, event: Event | None) -> Who | None:
+    """Who may cause an event in a mode; None where nobody can."""
+    row = None if event is None else _TABLE.get((mode, event))
+    return None if row is None else row.who
+
+
 def refusal(state: State, event: Event, now: float, by: Rights) -> Reason | None:
     """Reason why an event is refused; None if it is taken, or repeats what the state is already.
 

@@ -44,6 +44,12 @@ class Situation:
 HOLD: Final = "Teleoperation"
 _OF_HOLDER: Final = (*(command.name for command in COMMANDS if command.control), HOLD)
 
+#: What only a supervisor may do in a mode.
+OF_SUPERVISOR: Final[dict[Mode, tuple[str, ...]]] = {
+    mode: tuple(each.name for each in COMMANDS if "supervisor" in (each.role, modes.who(mode, each.event)))
+    for mode in modes.SEVERITY
+}
+
 #: Check of each condition of the robot: the reason why it does not hold, None if it does.
 _CHECKS: Final[dict[Condition, Callable[[Situation], Reason | None]]] = {
     "fresh sensors": lambda now: safety.sensors(now.health, now.config),

@@ -760,6 +760,7 @@ class CutSequence:
             NextCut(search, queue, config.search_steps_each, known, permit),
         )
         self._stage: Stage = Rest(self._parts)
+        self._survey: Survey | None = None
         self._places: tuple[Array, ...] = ()
 
     @property
@@ -812,8 +813,15 @@ class CutSequence:
         """Start a survey of this length (m), or of one site."""
         parts = self._parts
         parts.next_cut.forget()
-        survey = Survey(parts.config, parts.follower, parts.saturation, parts.queue, distance, place)
-        self._stage = Surveying(parts, survey)
+        self._survey = Survey(parts.config, parts.follower, parts.saturation, parts.queue, distance, place)
+        self._stage = Surveying(parts, self._survey)
+
+    def continue_survey(self) -> None:
+        """Go on with the last survey, which was interrupted."""
+        if self._survey is not None:
+            self._parts.next_cut.forget()
+            self._survey.go_on()
+            self._stage = Surveying(self._parts, self._survey)
 
     def look_around(self, prefix: str, postures: tuple[Array, ...], refusal: Refusal) -> None:
         """Start to take pictures from these postures of the arm (7, rad); `refusal` judges each."""

@@ -54,7 +54,9 @@ class Survey:
             place: The site to look at again, in place of a way along the row.
         """
         self._config, self._follower, self._saturation, self._queue = config, follower, saturation, queue
-        self._homing: Homing | None = Homing(config, follower, 1.0 / config.rate_hz)
+        #: Posture of the arm on the way (7, rad); None is the survey posture.
+        self._posture: Array | None = None
+        self._homing: Homing | None = self._to_posture()
         c, s = math.cos(config.work.row_heading), math.sin(config.work.row_heading)
         self._along, self._left = np.array([c, s]), np.array([-s, c])
         self._distance, self._place = distance, place
@@ -68,6 +70,10 @@ class Survey:
     def hold(self) -> None:
         """The robot stands for one period; that is no obstacle."""
         self._moved = None
+
+    def go_on(self) -> None:
+        """Go on after an interruption, wherever the arm is now. The way stays the same."""
+        self._homing, self._there_at, self._moved = self._to_posture(), None, None
 
     def step(self, robot: Measured, now: float) -> StepResult:
         """One period.
@@ -90,6 +96,9 @@ class Survey:
         if abs(self._goal - x) > _NEAR and self._there_at is None:
             return self._drive(robot, x, aside - self._line[1], float(base[2]), now)
         return self._wait(robot, now)
+
+    def _to_posture(self) -> Homing:
+        return Homing(self._config, self._follower, 1.0 / self._config.rate_hz, self._posture)
 
     def _drive(self, robot: Measured, x: float, aside: float, heading: float, now: float) -> StepResult:
         left = self._goal - x
@@ -118,8 +127,8 @@ class Survey:
         if self._line is not None and not self._again and self._unclear() > 0:
             self._again, self._goal, self._there_at, self._moved = True, self._line[0], None, None
             if self._queue.guyot:
-                high = np.array(self._config.work.survey_high)
-                self._homing = Homing(self._config, self._follower, 1.0 / self._config.rate_hz, high)
+                self._posture = np.array(self._config.work.survey_high)
+                self._homing = self._to_posture()
             return StepResult(xi, events=(reasons.survey_returns(self._unclear()),))
         return StepResult(xi, finished=True, summary=self._summary())
 

@@ -137,6 +137,7 @@ class ControllerState(Message, frozen=True, kw_only=True):
         allowed: Reason why each command, or motion by hand (`Teleoperation`), would be refused now; None if it would
             be taken. What is among `of_holder` is told for the holder. The commands about control are left out.
         of_holder: What only the holder of control may do now; without a holder, every operator.
+        of_supervisor: What only a supervisor may do now.
         active_point_id: Current point of the work; empty without one.
         method: Name of the whole-body method.
         T_odom_tool: Measured tool pose.
@@ -166,6 +167,7 @@ class ControllerState(Message, frozen=True, kw_only=True):
     reason: Reason
     allowed: dict[Name, Reason | None]
     of_holder: tuple[Name, ...] = ()
+    of_supervisor: tuple[Name, ...] = ()
     active_point_id: Annotated[str, Meta(max_length=64)]
     method: Name
     T_odom_tool: Pose | None

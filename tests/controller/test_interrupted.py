@@ -3,6 +3,7 @@
 import pytest
 
 from rolling_panda import commands as intents
+from rolling_panda import reasons
 from rolling_panda.messages.supervision import BaseVelocity, TeleopTarget
 from tests.support.controller_at_work import robot, run_until, working
 from tests.support.points import point
@@ -50,6 +51,33 @@ def test_what_was_paused_is_told_until_something_is_begun(begun, told):
     assert r.ask(intents.Survey(user="ada", distance=1.0)).ok
     r.run(0.1)
     assert (r.state.mode, r.state.interrupted) == ("AUTO", "")
+
+
+def test_one_command_goes_on_with_the_work_and_there_has_to_be_some():
+    r = at_work()
+    assert r.ask(intents.Pause(user="ada")).ok
+    r.run(0.1)
+    assert r.ask(intents.Continue(user="ada")).ok
+    r.run(0.1)
+    assert (r.state.mode, r.state.interrupted) == ("AUTO", "")
+    r = led_by_hand()
+    assert r.ask(intents.Pause(user="ada")).ok
+    r.run(0.1)
+    assert r.ask(intents.Continue(user="ada")).reason == reasons.nothing_interrupted()
+    assert r.state.mode == "PAUSED"
+    assert r.state.allowed["Continue"] == reasons.nothing_interrupted()
+
+
+def test_a_pause_refuses_to_go_on_where_perception_is_gone():
+    r = at_work()
+    assert r.ask(intents.Pause(user="ada")).ok
+    r.run(0.1)
+    assert r.state.allowed["Continue"] is None
+    r.perception = False
+    r.run(3.0)
+    told = r.state.allowed["Continue"]
+    assert told is not None and told.code in ("process_silent", "process_gone")
+    assert r.ask(intents.Continue(user="ada")).reason == told and r.state.mode == "PAUSED"
 
 
 def test_a_protective_stop_tells_it_through_its_acknowledgement_and_what_ended_by_itself_is_not_told():

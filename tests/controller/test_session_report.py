@@ -52,19 +52,20 @@ def test_a_cut_takes_from_the_one_before_or_from_the_start_of_work():
         (14.0, ticket("a", "DONE")),
         (17.0, ticket("b", "CUTTING", vine=2, user="ada")),
         (17.5, ticket("b", "FAILED_NOT_CUT", vine=2, reason=STANDS)),
-        (60.0, asked(intents.Start(user="ada"))),
+        (60.0, asked(intents.Continue(user="ada"))),
         (63.0, ticket("c", "CUTTING", vine=2, user="ada")),
+        (65.0, ticket("c", "DONE", vine=2, user="ada")),
     )
     assert told.began_at == BEGAN
     assert [(cut.point_id, cut.outcome, round(cut.seconds, 3)) for cut in told.cuts] == [
         ("a", "DONE", 4.0),
         ("b", "FAILED_NOT_CUT", 3.5),
-        ("c", "", 0.0),
+        ("c", "DONE", 5.0),
     ]
     assert told.cuts[1].reason == STANDS and told.cuts[1].ended_at == BEGAN + 17.5
     assert [(vine.vine, vine.done, vine.not_cut, round(vine.seconds, 3)) for vine in told.vines] == [
         (1, 1, 0, 4.0),
-        (2, 0, 1, 3.5),
+        (2, 1, 1, 8.5),
     ]
 
 

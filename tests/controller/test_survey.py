@@ -112,6 +112,43 @@ def test_a_pause_ends_it_and_resuming_does_not_begin_it_again():
     assert r.state.mode == "READY" and abs(r.q[0] - at) < 0.005
 
 
+def test_after_a_pause_one_command_goes_on_with_it_to_where_it_was_to_end():
+    r = surveying(1.0)
+    run_until(r, lambda s: s is not None and r.q[0] > 0.3, 30.0)
+    assert r.ask(intents.Pause(user="ada")).ok
+    r.run(1.0)
+    assert r.ask(intents.Continue(user="ada")).ok
+    finish(r, 40.0)
+    assert abs(r.q[0] - 1.0) < 0.02 and r.state.reason == reasons.surveyed(1, 1, 1, 0, 0)
+
+
+def test_on_the_way_back_it_goes_on_back_with_the_camera_where_it_was():
+    r = surveying(0.6)
+    r.show((), undecided_sites=(UNCLEAR,), rule=m.PruningRule(system="guyot"))
+    run_until(r, lambda s: s is not None and text_of(reasons.survey_returns(1)) in r.events and r.q[0] < 0.45, 40.0)
+    assert r.ask(intents.Pause(user="ada")).ok
+    r.run(0.5)
+    r.q[ARM_Q] = np.array(CONFIG.work.home)
+    assert r.ask(intents.Resume(user="ada")).ok
+    r.run(0.5)
+    assert r.ask(intents.Continue(user="ada")).ok
+    run_until(r, lambda s: r.q[0] < 0.3, 30.0)
+    assert np.abs(r.q[ARM_Q] - CONFIG.work.survey_high).max() < 0.02
+    finish(r, 40.0)
+    assert abs(r.q[0]) < 0.03
+
+
+def test_going_on_needs_what_the_survey_needs():
+    r = surveying(1.0)
+    run_until(r, lambda s: s is not None and r.q[0] > 0.3, 30.0)
+    assert r.ask(intents.Pause(user="ada")).ok
+    r.perception = False
+    r.run(3.0)
+    told = r.state.allowed["Continue"]
+    assert told is not None and told.code in ("process_silent", "process_gone")
+    assert r.ask(intents.Continue(user="ada")).reason == told and r.state.mode == "PAUSED"
+
+
 def test_the_stop_stops_it():
     r = surveying(2.0)
     run_until(r, lambda s: s is not None and r.q[0] > 0.2, 30.0)

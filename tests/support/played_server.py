@@ -12,7 +12,7 @@ from PIL import Image, ImageDraw
 from playwright.sync_api import Page
 from starlette.responses import JSONResponse, Response
 
-from controller.supervision.permission import HOLD, of_holder
+from controller.supervision.permission import HOLD, OF_SUPERVISOR, of_holder
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.commands import COMMANDS
@@ -46,6 +46,7 @@ ALLOWED = {
     "IDLE": ("Arm", "UseCamera", "UseBase"),
     "READY": (
         "Start",
+        "Continue",
         "Home",
         "Teleoperation",
         "UseCamera",
@@ -56,7 +57,7 @@ ALLOWED = {
     ),
     "AUTO": ("Pause",),
     "TELEOP": ("Pause", "Teleoperation"),
-    "PAUSED": ("Resume", "UseCamera", "UseBase"),
+    "PAUSED": ("Resume", "Continue", "UseCamera", "UseBase"),
     "ESTOP_LATCHED": ("Reset",),
 }
 
@@ -77,6 +78,7 @@ def controller(mode: m.Mode = "READY", reason: str | m.Reason = ARMED, **changes
         reason=said(reason) if isinstance(reason, str) else reason,
         allowed=_refused(mode) | dict.fromkeys((*ALLOWED.get(mode, ()), *points)),
         of_holder=of_holder(mode),
+        of_supervisor=OF_SUPERVISOR[mode],
         active_point_id="",
         method="nullspace",
         T_odom_tool=None,

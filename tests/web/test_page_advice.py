@@ -12,6 +12,7 @@ from rolling_panda import reasons
 from rolling_panda.messages import page as page_messages
 from rolling_panda.messages import types as types_messages
 from rolling_panda.messages.supervision import ControlState, PreviewState
+from rolling_panda.reasons import text_of
 from tests.support.page_parts import held, show
 from tests.support.played_page import until
 from tests.support.played_server import PlayedServer, controller, point
@@ -53,8 +54,7 @@ CASES = {
     "work": Case(mode("PAUSED", "work"), "resume_work", "#to-continue"),
     "work, nothing accepted": Case(mode("PAUSED", "work"), "press_resume accept_start", "#resume", points=(WAITS,)),
     "work, nothing found": Case(mode("PAUSED", "work"), "press_resume press_survey", "#resume", points=()),
-    "survey": Case(mode("PAUSED", "survey"), "press_resume survey_on", "#resume", points=(WAITS,)),
-    "survey with points accepted": Case(mode("PAUSED", "survey"), "press_resume survey_on_or_start", "#resume"),
+    "survey": Case(mode("PAUSED", "survey"), "resume_survey", "#to-continue", points=(WAITS,)),
     "teleoperation": Case(mode("PAUSED", "teleoperation"), "press_resume hold_again", "#resume"),
     "preview wanted": Case(mode("PAUSED", "work"), "press_resume preview_start", "#resume", preview=needed("none")),
     "preview shown": Case(mode("PAUSED", "work"), "press_resume approve_start", "#resume", preview=needed("ready")),
@@ -102,10 +102,10 @@ def test_the_first_button_that_advice_names_can_be_pressed(
 
 
 def test_once_resume_is_pressed_nothing_advises_to_press_it(page: Page, server: PlayedServer) -> None:
-    server.controller = mode("PAUSED", "survey")
+    server.controller = mode("PAUSED", "teleoperation")
     show(server, WAITS)
-    expect(page.locator("#alarms .act")).to_have_attribute("data-steps", "press_resume survey_on")
-    server.controller = mode("READY", "survey")
+    expect(page.locator("#alarms .act")).to_have_attribute("data-steps", "press_resume hold_again")
+    server.controller = mode("READY", "teleoperation")
     expect(page.locator("#resume")).to_have_attribute("aria-disabled", "true")
     expect(page.locator("#alarms .act:visible")).to_have_count(0, timeout=1000)
     server.controller = mode("AUTO", phase="SURVEY")
@@ -125,31 +125,44 @@ def test_a_robot_that_stands_for_a_picture_tells_so_and_asks_for_nothing(page: P
 
 
 def asked(server: PlayedServer) -> list[str]:
-    return [path for path, _ in server.posted if path in ("/api/resume", "/api/start")]
+    return [path for path, _ in server.posted if path in ("/api/resume", "/api/start", "/api/survey", "/api/continue")]
 
 
-def test_one_press_leads_from_a_pause_back_to_work(page: Page, server: PlayedServer) -> None:
-    server.controller = mode("PAUSED", "work")
+@pytest.mark.parametrize(
+    ("now", "interrupted", "words"),
+    [
+        ("PAUSED", "work", "Resume 1 cut"),
+        ("PAUSED", "survey", "Resume the survey"),
+        ("READY", "survey", "Resume the survey"),
+    ],
+)
+def test_one_press_leads_from_a_pause_back_to_work_or_survey(
+    page: Page, server: PlayedServer, now: m.Mode, interrupted: str, words: str
+) -> None:
+    server.controller = mode(now, interrupted)
     show(server, TAKEN)
+    expect(page.locator(".next #to-continue")).to_contain_text(words)
     page.locator("#to-continue").click()
-    until(page, lambda: asked(server) == ["/api/resume", "/api/start"])
+    until(page, lambda: asked(server) == ["/api/continue"])
 
 
-def test_work_is_not_started_where_resuming_is_refused(page: Page, server: PlayedServer) -> None:
-    server.controller = mode("PAUSED", "work")
+def test_going_on_is_greyed_with_its_reason_where_it_would_be_refused(page: Page, server: PlayedServer) -> None:
+    why = reasons.process_gone("perception")
+    state = mode("PAUSED", "work")
+    server.controller = msgspec.structs.replace(state, allowed=state.allowed | {"Continue": why})
     show(server, TAKEN)
-    server.answers["/api/resume"] = (409, {"ok": False, "reason": "not now"})
-    page.locator("#to-continue").click()
-    expect(page.locator(".toast")).to_contain_text("Resume refused: not now")
+    go_on = page.locator(".next #to-continue")
+    expect(go_on).to_have_attribute("aria-disabled", "true")
+    expect(page.locator(".next-why")).to_have_text(text_of(why))
+    go_on.click(force=True)
     page.wait_for_timeout(300)
-    assert asked(server) == ["/api/resume"]
+    assert asked(server) == []
 
 
 @pytest.mark.parametrize(
     ("interrupted", "points", "preview"),
     [
         ("teleoperation", (TAKEN,), None),
-        ("survey", (TAKEN,), None),
         ("work", (WAITS,), None),
         ("work", (TAKEN, point(2, "UNKNOWN", spur=2)), None),
         ("work", (TAKEN,), needed("ready")),

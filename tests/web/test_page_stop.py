@@ -60,6 +60,32 @@ def test_a_pressed_button_on_the_robot_comes_before_the_reset(page: Page, server
     until(page, lambda: ("/api/reset", {"reason": "row is clear", "stop_id": "s1"}) in server.posted)
 
 
+def test_a_viewer_has_no_button_that_leads_to_a_reset_and_an_operator_is_told_whose_it_is(
+    page: Page, server: PlayedServer
+) -> None:
+    server.bridge = bridge(stop_id="s1", stopped_by=reasons.software_stop("Ada", said("branch")))
+    server.controller = controller("ESTOP_LATCHED")
+    release, reset = page.locator("#to-reset"), page.locator("#reset")
+    server.role = "operator"
+    for button in (release, reset):
+        expect(button).to_have_attribute("title", text_of(reasons.supervisor_needed()))
+    server.role = "viewer"
+    for button in (release, reset):
+        expect(button).to_be_hidden()
+    expect(page.locator("rp-stop-banner")).to_contain_text("supervisor")
+    server.role = "supervisor"
+    expect(release).to_have_attribute("aria-disabled", "false")
+
+
+def test_a_fault_is_acknowledged_by_a_supervisor(page: Page, server: PlayedServer) -> None:
+    state = controller("FAULT")
+    server.controller = msgspec.structs.replace(state, allowed=state.allowed | {"Acknowledge": None})
+    server.role = "operator"
+    expect(page.locator("#acknowledge")).to_have_attribute("title", text_of(reasons.supervisor_needed()))
+    server.role = "supervisor"
+    expect(page.locator("#acknowledge")).to_have_attribute("aria-disabled", "false")
+
+
 @pytest.mark.parametrize("size", [(1280, 800), (1024, 768)])
 def test_no_notice_lies_over_the_field_for_the_reason(page: Page, server: PlayedServer, size: tuple[int, int]) -> None:
     page.set_viewport_size({"width": size[0], "height": size[1]})

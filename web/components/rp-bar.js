@@ -98,7 +98,7 @@ class RpBar extends HTMLElement {
       const isNext = name === next;
       setEnabled(button, why, isCommand(name) ? text(`command.${name}.hint`) : "");
       setText(label, isNext ? labelOf(name) : isCommand(name) ? text(`command.${name}`) : "");
-      setText(duration, isNext && (name === "Start" || name === "continue") ? howLong() : "");
+      setText(duration, isNext && (name === "Start" || (name === "continue" && !surveying())) ? howLong() : "");
       button.classList.toggle("primary", isNext);
       box.hidden = !isNext && (!isCommand(name) || why !== null);
       left += Number(!isNext && !box.hidden);
@@ -122,7 +122,7 @@ function labelOf(step) {
     case "Start":
       return countOf("ACCEPTED") > 0 ? counted("bar.start", countOf("ACCEPTED")) : text("command.Start");
     case "continue":
-      return counted("bar.resume", countOf("ACCEPTED"));
+      return surveying() ? text("bar.resume_survey") : counted("bar.resume", countOf("ACCEPTED"));
     case "review":
       return counted("bar.review", countOf("PROPOSED"));
     case "preview":
@@ -132,6 +132,11 @@ function labelOf(step) {
     default:
       return text(`command.${step}`);
   }
+}
+
+/** Was a survey interrupted? */
+function surveying() {
+  return pageState.get()?.controller?.interrupted === "survey";
 }
 
 /** How long the accepted cuts take; empty where that is not known, or there is none. */

@@ -59,8 +59,8 @@ class RpStopBanner extends HTMLElement {
         this.setAttribute("role", shown ? "alert" : "none");
       }
       if (!shown) return;
-      // Without a link no reset is possible, and two banners leave little of the view.
-      form.hidden = hint.hidden = link.get().status !== "open";
+      // Without a link no reset is possible, and two banners leave little of the view. A viewer never resets.
+      form.hidden = hint.hidden = link.get().status !== "open" || state?.role === "viewer";
       const told = state?.bridge?.stopped_by ?? (byController ? state?.controller?.reason : null);
       // The reason names the kind of stop.
       setText(title, text(told ? "mode.ESTOP_LATCHED" : "stop.idle"));

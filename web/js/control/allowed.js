@@ -60,8 +60,10 @@ export function whyNot(command) {
   const { held, mine, user } = holder();
   const theirs = held && !mine && controller.of_holder.includes(command);
   // Until the robot tells of a stop that was pressed here, its state still allows what the stop will refuse.
+  const ofOthers = pageState.get()?.role !== "supervisor" && controller.of_supervisor.includes(command);
   const stopping = stopProgress.get() === "sending" || stopProgress.get() === "sent";
   if (stopping && controller.of_holder.includes(command)) return refusal ?? reason("stop_asked");
+  if (ofOthers) return reason("supervisor_needed");
   return refusal ?? (theirs ? reason("control_held", { user }) : null);
 }
 

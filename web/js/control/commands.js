@@ -24,7 +24,8 @@ export function isCommand(step) {
 /** Why a step is not possible now. @param {Step} step */
 export function whyNotStep(step) {
   if (step === "approve") return whyNoApproval();
-  if (step === "continue") return whyNot("Resume");
+  if (step === "continue") return whyNot("Continue");
+  if (step === "reset") return whyNot("Reset");
   if (step === "calibration") return whyNot("UseCamera");
   return isCommand(step) ? whyNot(step) : null;
 }
@@ -33,7 +34,7 @@ export function whyNotStep(step) {
 export function take(step) {
   switch (step) {
     case "continue":
-      void continueWork();
+      void ask(text("command.Resume"), "api/continue");
       break;
     case "review":
       openScreen("review");
@@ -60,9 +61,4 @@ async function useCalibration() {
   /** @type {CameraState|null} */
   const camera = await fetchJson("api/camera");
   if (camera?.offer) void ask(text("command.UseCamera"), "api/camera/use", { made_at: camera.offer.made_at });
-}
-
-/** Two requests, each checked by the controller: resuming alone starts no work. */
-async function continueWork() {
-  if (await ask(text("command.Resume"), "api/resume")) void ask(text("command.Start"), "api/start");
 }

@@ -6,14 +6,15 @@ import { countOf } from "./allowed.js";
 import { previewOpen } from "./preview.js";
 
 /** @typedef {import("./commands.js").Step} Step */
+/** @typedef {import("../link/messages.js").Interrupted} Interrupted */
 
-/** @returns {Step|""} Empty for a recording. */
+/** @returns {Step|""} Empty for a recording, and after a stop for a viewer. */
 export function nextStep() {
   const state = pageState.get();
   if (state?.replay) return "";
   switch (state?.controller?.mode) {
     case "READY":
-      return whenReady(state.controller.interrupted === "survey");
+      return whenReady(state.controller.interrupted);
     case "AUTO":
     case "TELEOP":
       return "Pause";
@@ -23,29 +24,31 @@ export function nextStep() {
     case "FAULT":
       return "Acknowledge";
     case "ESTOP_LATCHED":
-      return "reset";
+      return state.role === "viewer" ? "" : "reset";
     default:
       return "Arm";
   }
 }
 
 /**
- * @param {boolean} surveying Was a survey interrupted?
+ * @param {Interrupted} interrupted
  * @returns {Step}
  */
-function whenReady(surveying) {
-  if (surveying) return "Survey";
+function whenReady(interrupted) {
+  if (interrupted === "survey") return "continue";
   if (countOf("ACCEPTED") > 0) return withPreview();
   if (countOf("PROPOSED") === 0) return "Survey";
   return screen.get() === "review" ? "Start" : "review";
 }
 
 /**
- * Does one press lead from a pause back to work? Not where a person has to look at a plant or a preview first.
+ * Does one press lead from a pause back to what was interrupted? Not where a person has to look at a plant or a preview
+ * first.
  *
- * @param {import("../link/messages.js").ControllerState["interrupted"]} interrupted
+ * @param {Interrupted} interrupted
  */
 export function mayContinue(interrupted) {
+  if (interrupted === "survey") return true;
   return interrupted === "work" && countOf("UNKNOWN") === 0 && countOf("ACCEPTED") > 0 && withPreview() === "Start";
 }
 

@@ -216,6 +216,8 @@ export interface ControllerState {
   allowed: Record<string, Reason|null>;
   /** What only the holder of control may do now; without a holder, every operator. */
   of_holder: string[];
+  /** What only a supervisor may do now. */
+  of_supervisor: string[];
   /** Current point of the work; empty without one. */
   active_point_id: string;
   /** Name of the whole-body method. */

@@ -222,7 +222,8 @@ function mended(allowed) {
 
 /** @param {ControllerState} controller In PAUSED. */
 function afterPause(controller) {
-  return mayContinue(controller.interrupted) ? [reason("resume_work")] : [reason("press_resume"), next(controller)];
+  if (!mayContinue(controller.interrupted)) return [reason("press_resume"), next(controller)];
+  return [reason(controller.interrupted === "survey" ? "resume_survey" : "resume_work")];
 }
 
 /**
@@ -233,7 +234,6 @@ function afterPause(controller) {
 function next({ interrupted }) {
   const accepted = countOf("ACCEPTED") > 0;
   if (interrupted === "teleoperation") return reason("hold_again");
-  if (interrupted === "survey") return accepted ? reason("survey_on_or_start") : reason("survey_on");
   if (!accepted) return countOf("PROPOSED") > 0 ? reason("accept_start") : reason("press_survey");
   const told = preview.get();
   if (!told?.required || told.phase === "approved") return reason("press_start");
