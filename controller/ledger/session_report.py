@@ -114,6 +114,9 @@ class SessionReportBuilder:
         known = self._cuts.get(row.cut_id)
         if row.state == "CUTTING":
             point = row.point
+            # A second try takes the place of the first.
+            for key in [key for key, cut in self._cuts.items() if cut.point_id == point.point_id and not cut.outcome]:
+                del self._cuts[key]
             cut = CutReport(cut_id=row.cut_id, point_id=point.point_id, vine=point.vine, spur=point.spur, user=row.user)
             self._cuts[row.cut_id] = cut
         elif known is not None and row.state in _ENDED:

@@ -22,7 +22,8 @@ def at(seconds):
 
 
 def ticket(name, state, vine=1, **changes):
-    return TicketRow(point=replace(pruning_point(name), vine=vine), state=state, cut_id=f"c-{name}", **changes)
+    usual = {"point": replace(pruning_point(name), vine=vine), "state": state, "cut_id": f"c-{name}"}
+    return TicketRow(**(usual | changes))
 
 
 STANDS, LATE = reasons.stands_not_cut(reasons.cutter_missed()), reasons.not_reached("the cut", 4.0, 0.5)
@@ -67,6 +68,19 @@ def test_a_cut_takes_from_the_one_before_or_from_the_start_of_work():
         (1, 1, 0, 4.0),
         (2, 1, 1, 8.5),
     ]
+
+
+def test_a_cut_that_was_tried_twice_is_one_cut():
+    told = report(
+        (0.0, asked(intents.Start(user="ada"))),
+        (3.0, ticket("a", "CUTTING", user="ada", cut_id="first")),
+        (6.0, ticket("a", "CUTTING", user="ada", cut_id="second")),
+        (8.0, ticket("a", "FAILED_NOT_CUT", cut_id="second", reason=STANDS)),
+    )
+    assert [(cut.cut_id, cut.outcome, round(cut.seconds, 3)) for cut in told.cuts] == [
+        ("second", "FAILED_NOT_CUT", 8.0)
+    ]
+    assert told.cut_count == 1
 
 
 def test_the_timeline_tells_modes_cuts_and_refusals_and_no_other_line():
