@@ -2,6 +2,7 @@
 
 import argparse
 import secrets
+import socket
 import sys
 import tempfile
 import threading
@@ -74,13 +75,28 @@ def _run(arguments: argparse.Namespace, stopping: threading.Event) -> int:
         children.start("server", python_command("server", options))
         page = f"http://127.0.0.1:{arguments.port}"
         print(f"{arguments.file}: {recording.duration_s:.0f} s, {len(recording.messages)} messages", flush=True)
-        print(f"\nSign in once with this link, on this machine:\n\n    {page}/sign-in?token={token}\n", flush=True)
+        link_due = True
         while not stopping.wait(_PERIOD_S):
             replay.step(time.monotonic())
             exited = children.exited()
             if exited is not None:
                 raise InputError(f"the page's server ended {exited.cause}: {exited.output}")
+            # Not before there is somebody to open it.
+            if link_due and _answers(arguments.port):
+                print(
+                    f"\nSign in once with this link, on this machine:\n\n    {page}/sign-in?token={token}\n", flush=True
+                )
+                link_due = False
     return 0
+
+
+def _answers(port: int) -> bool:
+    """Whether somebody listens there."""
+    try:
+        socket.create_connection((_HOST, port), 1.0).close()
+    except OSError:
+        return False
+    return True
 
 
 class Replay(Closing):

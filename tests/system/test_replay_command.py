@@ -50,6 +50,7 @@ def test_a_recording_is_shown_moved_in_and_asked_in_vain(tmp_path: Path) -> None
         token = next(found[1] for line in replay.stdout if (found := re.search(r"token=(\S+)", line)))
         url = f"http://127.0.0.1:{port}"
         with httpx.Client(base_url=url, headers={"Origin": url}, timeout=60.0) as client:
+            assert client.get("/sign-in").is_success, "the link can be opened as soon as it is told"
             eventually(lambda: answers(client), 120.0)
             client.post("/api/sign-in", json={"token": token}).raise_for_status()
             assert client.post("/api/replay", json={"position_s": 5.0, "playing": False}).json()["ok"]

@@ -223,7 +223,7 @@ function mended(allowed) {
 /** @param {ControllerState} controller In PAUSED. */
 function afterPause(controller) {
   if (!mayContinue(controller.interrupted)) return [reason("press_resume"), next(controller)];
-  return [reason(controller.interrupted === "survey" ? "resume_survey" : "resume_work")];
+  return [controller.interrupted === "survey" ? reason("resume_survey") : reason("resume_work")];
 }
 
 /**
