@@ -84,6 +84,19 @@ def test_one_moves_in_it_by_slider_keys_and_speed(page: Page, server: PlayedServ
     assert len(asked(server)) == 7
 
 
+def test_the_keys_count_after_a_button_was_pressed_too(page: Page, server: PlayedServer) -> None:
+    play(page, server)
+    page.locator("#replay-toggle").click()
+    page.keyboard.press("Home")
+    page.keyboard.press(" ")
+    until(page, lambda: len(asked(server)) >= 3)
+    page.wait_for_timeout(300)
+    assert asked(server) == [{"playing": False}, {"playing": True, "position_s": 0}, {"playing": False}]
+    # Its own key presses it.
+    page.keyboard.press("Enter")
+    until(page, lambda: len(asked(server)) == 4)
+
+
 def test_at_its_end_it_begins_again(page: Page, server: PlayedServer) -> None:
     play(page, server, position_s=DURATION, playing=False)
     page.click("#replay-toggle")

@@ -49,6 +49,8 @@ export function initReplay() {
     document.title = text("replay.document", { name: state.replay.name });
     void import("../../components/rp-replay.js");
     window.addEventListener("keydown", press);
+    // A focused button would be clicked on keyup.
+    window.addEventListener("keyup", (event) => event.key === " " && isButton(event) && event.preventDefault());
   });
 }
 
@@ -63,10 +65,15 @@ const KEYS = Object.freeze({
 });
 
 /** @param {KeyboardEvent} event */
+function isButton(event) {
+  return event.target instanceof Element && event.target.closest("button") !== null;
+}
+
+/** @param {KeyboardEvent} event */
 function press(event) {
-  // Other controls have keys of their own. The slider's arrows would move by a tenth of a second.
-  const used = event.target instanceof Element && event.target.closest("button, a, input:not(#replay-position), select, summary");
-  if (used || event.ctrlKey || event.altKey || event.metaKey || isTyping(event.target)) return;
+  // Other controls have keys of their own, a button only Enter. The slider's arrows would move by a tenth of a second.
+  const used = event.target instanceof Element && event.target.closest("a, input:not(#replay-position), select, summary");
+  if (used || event.defaultPrevented || event.ctrlKey || event.altKey || event.metaKey || isTyping(event.target)) return;
   const act = KEYS[event.key];
   if (!act) return;
   event.preventDefault();
