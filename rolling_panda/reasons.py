@@ -733,6 +733,16 @@ def none_proposed() -> None:
     """There is no proposed point."""
 
 
+@_reason("info", "look at the pictures")
+def none_seen() -> None:
+    """No sure cut has been seen here."""
+
+
+@_reason("info", "")
+def none_undecided() -> None:
+    """There is nothing to decide at a place of this vine."""
+
+
 @_reason("info", "")
 def preview_approved_already(user: str) -> None:
     """{user} has approved it already."""

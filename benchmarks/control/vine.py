@@ -11,7 +11,7 @@ import math
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -44,9 +44,9 @@ from rolling_panda.errors import InputError
 from tests.support.worlds.closed_loop import ClosedLoop
 
 Training = Literal["spur", "guyot"]
-#: `each`: one press for each cut and each undecided place, in the page's order. `sure`: "Accept all sure cuts" first,
-#: then the others. `nothing`: nobody decides.
-Review = Literal["each", "sure", "nothing"]
+#: `each`: one press for each cut and each undecided place, in the page's order. `vine`: the whole vine at once, its
+#: sure cuts accepted in one press and its places left in another, then the other cuts. `nothing`: nobody decides.
+Review = Literal["each", "vine", "nothing"]
 Outcome = Literal["right", "wrong", "refused", "undecided", "unseen"]
 OUTCOMES: tuple[Outcome, ...] = ("right", "wrong", "refused", "undecided", "unseen")
 #: Stages in the order of a vine; only `decisions` are the person's.
@@ -57,6 +57,11 @@ _CAMERA_AHEAD = 0.5
 PRESS_S = 1.0
 #: As on the page, no decision sooner after the cut has changed (s); nobody looks at one item for longer (s).
 _CHANGED_S, _LONGEST_LOOK_S = 0.7, 15.0
+#: Who looks at the pictures of a whole vine looks at each for so long: one fixation of the eye. In pictures of scenes
+#: a fixation takes 0.33 s on average (Henderson and Hollingworth 1999, doi:10.1146/annurev.psych.50.1.243).
+GLANCE_S = 0.33
+#: Fewer cuts and places than this are decided one by one: that takes no more presses.
+_AT_ONCE = 4
 #: After the last decision the plan settles and is computed (s).
 _PLAN_S = 2.0
 #: A point is accepted no more often than this; stretches of decisions and work, since work finds more points.
@@ -106,7 +111,7 @@ class VineRun:
         review: How the reviewer decides.
         decision_s: Time of one decision (s).
         stages: Seconds by stage (simulated).
-        decisions: Presses that decide about cuts and places.
+        decisions: Presses that decide about cuts and places, or open a whole vine.
         refusals: Codes of refused acceptances, by point.
         cuts: The accepted points.
         places: The cuts that the vine asks for.
@@ -116,6 +121,8 @@ class VineRun:
         canes_touched: Canes that stay, in the part that stays, which other parts than the blades overlapped with.
         ended: Empty where the robot left the vine; else why it did not.
         wall_s: Real time of the run (s).
+        glance_s: Look at one of several pictures (s).
+        glances: Such looks.
     """
 
     seed: int
@@ -134,11 +141,13 @@ class VineRun:
     canes_touched: dict[str, str]
     ended: str
     wall_s: float
+    glance_s: float = GLANCE_S
+    glances: int = 0
 
     @property
     def key(self) -> tuple[object, ...]:
         """What tells it from other runs."""
-        return self.training, self.preset, self.review, self.decision_s, self.seed
+        return self.training, self.preset, self.review, self.decision_s, self.glance_s, self.seed
 
     @property
     def person_s(self) -> float:
@@ -164,7 +173,9 @@ class Reviewer:
         loop: The robot.
         seconds: Time of one decision (s).
         review: How they decide.
+        glance: Time to look at one of several pictures (s).
         decisions: Presses so far.
+        glances: Looks at one of several pictures so far.
         points: Every point that was proposed, as it was last seen.
         accepted: Entries of the accepted points, as they were accepted.
         refusals: Codes of refused acceptances, by point.
@@ -173,7 +184,9 @@ class Reviewer:
     loop: ClosedLoop
     seconds: float
     review: Review
+    glance: float = GLANCE_S
     decisions: int = 0
+    glances: int = 0
     points: dict[str, m.PruningPoint] = field(default_factory=dict)
     accepted: dict[str, m.QueueEntry] = field(default_factory=dict)
     refusals: dict[str, str] = field(default_factory=dict)
@@ -182,16 +195,11 @@ class Reviewer:
 
     def decide(self) -> None:
         """Decide about everything that is open, one item after the other along the row."""
-        sure = [point.point_id for point in self._proposed() if point.confidence >= SURE]
         if self.review == "nothing":
             self._look("")
             return
-        if self.review == "sure" and sure:
-            # The button tells how many cuts are sure; the second press accepts them.
-            self._look("")
-            self._asked.update(sure)
-            self.decisions += 2
-            self._note(self.loop.command(intents.AcceptAll(user=USER, confidence=SURE)), "")
+        if self.review == "vine":
+            self._decide_at_once()
         last = (0, 0, False, "")
         while self.decisions < _DECISIONS_AT_MOST and (item := self._next(last)) is not None:
             last = item
@@ -199,13 +207,63 @@ class Reviewer:
             shown = self._look(point_id)
             self.decisions += 1
             if is_place:
-                self._left.add((vine, spur))
-                self.loop.perception.answer(intents.LeaveSite(user=USER, vine=vine, spur=spur))
+                self._leave(vine, spur)
                 continue
             self._asked[point_id] += 1
             if shown is not None:
-                accept = intents.AcceptPoint(user=USER, point_id=point_id, revision=shown.revision, digest=shown.digest)
-                self._note(self.loop.command(accept), point_id)
+                self._accept([shown])
+
+    def _decide_at_once(self) -> None:
+        """Look at the pictures of a whole vine, one after the other; accept its sure cuts, leave its places.
+
+        A cut that has changed since it was looked at is looked at again, as the page asks.
+        """
+        sure, places = self._sure(), self._places()
+        if len(sure) + len(places) < _AT_ONCE:
+            return
+        self._press()
+        shown: dict[str, m.PruningPoint] = {}
+        end = self.loop.now + _LONGEST_LOOK_S
+        while self.loop.now < end:
+            unseen = [point for point in self._sure().values() if shown.get(point.point_id) != point]
+            if not unseen:
+                break
+            point = unseen[0]
+            self._glance(_CHANGED_S if point.point_id in shown else self.glance)
+            shown[point.point_id] = point
+        for _ in places:
+            self._glance(self.glance)
+        if shown:
+            self._press()
+            self._asked.update(list(shown))
+            self._accept(shown.values())
+        if places:
+            self._press()
+            for vine, spur in places:
+                self._leave(vine, spur)
+
+    def _press(self) -> None:
+        self.loop.run(self.seconds)
+        self.decisions += 1
+
+    def _glance(self, seconds: float) -> None:
+        self.loop.run(seconds)
+        self.glances += 1
+
+    def _accept(self, points: Iterable[m.PruningPoint]) -> None:
+        """Accept points as they were shown, and keep the answers and what is accepted after it."""
+        for shown in points:
+            name = shown.point_id
+            accept = intents.AcceptPoint(user=USER, point_id=name, revision=shown.revision, digest=shown.digest)
+            answer = self.loop.command(accept)
+            if not answer.ok:
+                self.refusals[name] = codes(answer.reason)
+        self.loop.run(0.1)
+        self.accepted |= {entry.point_id: entry for entry in self.loop.queue("ACCEPTED", "UNREACHABLE")}
+
+    def _leave(self, vine: int, spur: int) -> None:
+        self._left.add((vine, spur))
+        self.loop.perception.answer(intents.LeaveSite(user=USER, vine=vine, spur=spur))
 
     def look_at_unknown(self, row: Row) -> None:
         """Look at the wood of each cut of unknown outcome, and tell."""
@@ -217,13 +275,6 @@ class Reviewer:
             outcome: Literal["DONE", "FAILED_NOT_CUT"] = "FAILED_NOT_CUT" if stands else "DONE"
             told = intents.ResolvePoint(user=USER, point_id=entry.point_id, outcome=outcome, reason="seen by eye")
             self.loop.command(told)
-
-    def _note(self, answer: m.Answer, point_id: str) -> None:
-        """Keep the answer to an acceptance, and what is accepted after it."""
-        if not answer.ok:
-            self.refusals[point_id] = codes(answer.reason)
-        self.loop.run(0.1)
-        self.accepted |= {entry.point_id: entry for entry in self.loop.queue("ACCEPTED", "UNREACHABLE")}
 
     def _proposed(self) -> list[m.PruningPoint]:
         """Points that wait for a decision."""
@@ -237,14 +288,24 @@ class Reviewer:
             point for point in points if point.point_id in waiting and self._asked[point.point_id] < _ACCEPTED_AT_MOST
         ]
 
+    def _sure(self) -> dict[str, m.PruningPoint]:
+        """Points that perception is sure of."""
+        return {point.point_id: point for point in self._proposed() if point.confidence >= SURE}
+
+    def _places(self) -> dict[tuple[int, int], bool]:
+        """Undecided places that are still to be left, and whether each can wait for another look."""
+        shown = self.loop.inbox.newest(m.PruningPoints)
+        found: dict[tuple[int, int], bool] = {}
+        for site in () if shown is None else shown.message.undecided_sites:
+            place = site.vine, site.spur
+            if site.vine > 0 and site.needs != "nothing" and place not in self._left:
+                found[place] = found.get(place, True) and site.needs != "operator"
+        return found
+
     def _next(self, last: tuple[int, int, bool, str]) -> tuple[int, int, bool, str] | None:
         """The page's next item after one: vine, spur, whether it is a place without a point, and its point."""
         items = {(point.vine, point.spur, False, point.point_id): False for point in self._proposed()}
-        shown = self.loop.inbox.newest(m.PruningPoints)
-        for site in () if shown is None else shown.message.undecided_sites:
-            if site.vine > 0 and site.needs != "nothing" and (site.vine, site.spur) not in self._left:
-                place = site.vine, site.spur, True, ""
-                items[place] = items.get(place, True) and site.needs != "operator"
+        items |= {(vine, spur, True, ""): waits for (vine, spur), waits in self._places().items()}
         # On a round along the row; places that another look may settle come last.
         return min(items, key=lambda item: (items[item], item <= last, item), default=None)
 
@@ -354,6 +415,7 @@ def prune_vine(
     decision_s: float = 3.0,
     pictures: float = 2.0,
     segmenter: str = "",
+    glance_s: float = GLANCE_S,
 ) -> VineRun:
     """Arrive, survey, decide, cut, leave, and judge.
 
@@ -365,6 +427,7 @@ def prune_vine(
         decision_s: Time of one decision (s).
         pictures: The camera takes a second while the robot moves.
         segmenter: In place of the configured one.
+        glance_s: Look at one of several pictures (s).
 
     Raises:
         InputError: There is no such preset.
@@ -388,7 +451,7 @@ def prune_vine(
             before = row_of(loop)
             touches, wanted = CaneTouches(staying_rods(before)), wanted_cuts(before, training == "guyot")
             clock = StageClock(load_section(config, "controller", ControllerConfig))
-            visit = Visit(loop, Reviewer(loop, decision_s, review), clock, length)
+            visit = Visit(loop, Reviewer(loop, decision_s, review, glance_s), clock, length)
             ended = visit.make()
             ends = {entry.point_id: entry for entry in loop.queue()}
             shown = loop.inbox.newest(m.PruningPoints)
@@ -413,6 +476,8 @@ def prune_vine(
         canes_touched=named(touches.touched_staying),
         ended=ended,
         wall_s=time.perf_counter() - began,
+        glance_s=glance_s,
+        glances=reviewer.glances,
     )
 
 
@@ -527,7 +592,8 @@ def tell(run: VineRun) -> None:
     harmed = sum(bool(cut.harm) for cut in run.cuts)
     print(
         f"{run.training}, {run.preset}, {run.review} {run.decision_s:g} s, seed {run.seed}: "
-        f"machine {run.machine_s:.0f} s, person {run.person_s:.0f} s in {run.decisions} decisions; {outcomes}; "
+        f"machine {run.machine_s:.0f} s, "
+        f"person {run.person_s:.0f} s in {run.decisions} decisions, {run.glances} glances; {outcomes}; "
         f"{harmed} harmed, {run.contacts}+{run.self_contacts} contacts, {run.wall_s:.0f} s of real time"
         + (f"; not left: {run.ended}" if run.ended else ""),
         flush=True,
@@ -592,12 +658,19 @@ def main(argv: Sequence[str]) -> int:
     parser.add_argument("--count", type=_positive, default=30, help="vines (default: %(default)s)")
     parser.add_argument(
         "--review",
-        choices=("each", "sure", "nothing"),
+        choices=("each", "vine", "nothing"),
         default="each",
-        help="decide about each cut, accept all sure ones first, or decide nothing (default: each)",
+        help="decide about each cut, about a whole vine's sure ones at once, or about nothing (default: each)",
     )
     parser.add_argument(
         "--decision", type=_seconds, default=3.0, metavar="SECONDS", help="of one decision (default: 3)"
+    )
+    parser.add_argument(
+        "--glance",
+        type=_seconds,
+        default=GLANCE_S,
+        metavar="SECONDS",
+        help="to look at one picture of a whole vine's (default: %(default)s)",
     )
     parser.add_argument(
         "--pictures", type=_seconds, default=2.0, metavar="HZ", help="pictures a second in motion (default: 2)"
@@ -607,11 +680,18 @@ def main(argv: Sequence[str]) -> int:
     known = [] if words.json is None else read(words.json)
     runs: list[VineRun] = []
     for seed in range(words.seed, words.seed + words.count):
-        key = (words.training_system, words.preset, words.review, words.decision, seed)
+        key = (words.training_system, words.preset, words.review, words.decision, words.glance, seed)
         found = next((run for run in known if run.key == key), None)
         if found is None:
             found = prune_vine(
-                seed, words.training_system, words.preset, words.review, words.decision, words.pictures, words.segmenter
+                seed,
+                words.training_system,
+                words.preset,
+                words.review,
+                words.decision,
+                words.pictures,
+                words.segmenter,
+                words.glance,
             )
             known.append(found)
             # Many vines take hours: what is done is on disk, and the next run goes on from there.

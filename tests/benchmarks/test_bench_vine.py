@@ -17,7 +17,6 @@ from bridge.sim import build
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
 from bridge.sim.vineyard.row import Row
-from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.errors import InputError
@@ -64,10 +63,6 @@ class Page:
 
     def command(self, asked):
         self.asked.append((round(self.now, 1), asked))
-        if isinstance(asked, intents.AcceptAll):
-            sure = [name for name, each in self.points.items() if each.confidence >= asked.confidence]
-            self.states |= dict.fromkeys(sure, "ACCEPTED")
-            return m.Answer(ok=True)
         if asked.point_id in self.refuses:
             return m.Answer(ok=False, reason=reasons.point_unseen(asked.point_id))
         assert asked.revision == self.points[asked.point_id].revision
@@ -117,12 +112,35 @@ def test_a_refused_acceptance_is_asked_twice_and_told_with_its_code():
     assert reviewer.refusals == {"a": "point_unseen"} and set(reviewer.accepted) == {"b"}
 
 
-def test_sure_cuts_take_two_presses_and_the_others_one_each():
-    page = Page([at("a", 1, 1), at("b", 1, 2), at("c", 1, 3, confidence=0.5)])
-    reviewer = bench.Reviewer(page, 3.0, "sure")
+def test_sure_cuts_and_places_of_a_vine_take_three_presses_and_a_glance_each_and_the_others_one():
+    page = Page([at("a", 1, 1), at("b", 1, 2), at("c", 1, 3, confidence=0.5)], [place(4), place(5, "another look")])
+    reviewer = bench.Reviewer(page, 2.0, "vine", 0.5)
     reviewer.decide()
-    assert told(page) == ["place ", "c"] and isinstance(page.asked[0][1], intents.AcceptAll)
-    assert reviewer.decisions == 3 and set(reviewer.accepted) == {"a", "b", "c"}
+    assert told(page) == ["a", "b", "place 4", "place 5", "c"]
+    assert (reviewer.decisions, reviewer.glances) == (4, 4) and set(reviewer.accepted) == {"a", "b", "c"}
+    assert page.now == pytest.approx(4 * 2.0 + 4 * 0.5, abs=0.5)
+
+
+def test_a_cut_that_changes_after_a_glance_is_looked_at_again_and_accepted_as_it_is_then():
+    page = Page([at(name, 1, k) for k, name in enumerate("abcd")], changes=[(2.4, "a")])
+    reviewer = bench.Reviewer(page, 1.0, "vine", 0.5)
+    reviewer.decide()
+    assert [asked.revision for _, asked in page.asked] == [2, 1, 1, 1]
+    assert (reviewer.decisions, reviewer.glances) == (2, 5) and not reviewer.refusals
+
+
+def test_a_cut_that_changes_at_the_press_is_refused_and_asked_again():
+    page = Page([at(name, 1, k) for k, name in enumerate("abcd")], refuses=("b",))
+    reviewer = bench.Reviewer(page, 1.0, "vine", 0.5)
+    reviewer.decide()
+    assert told(page) == ["a", "b", "c", "d", "b"] and reviewer.refusals == {"b": "point_unseen"}
+
+
+def test_few_cuts_are_decided_one_by_one():
+    page = Page([at("a", 1, 1), at("b", 1, 2)], [place(3)])
+    reviewer = bench.Reviewer(page, 1.0, "vine", 0.5)
+    reviewer.decide()
+    assert told(page) == ["a", "b", "place 3"] and (reviewer.decisions, reviewer.glances) == (3, 0)
 
 
 def test_a_reviewer_who_decides_nothing_asks_for_nothing():
@@ -232,7 +250,7 @@ def test_a_run_goes_on_where_the_last_one_stopped_and_its_file_is_drawn(tmp_path
     path = tmp_path / "vine.json"
     assert bench.main(["--seed", "7", "--count", "1", "--json", str(path)]) == 0
     assert bench.main(["--seed", "7", "--count", "2", "--json", str(path)]) == 0
-    assert made == [(seed, "spur", "calm", "each", 3.0, 2.0, "") for seed in (7, 8)]
+    assert made == [(seed, "spur", "calm", "each", 3.0, 2.0, "", 0.33) for seed in (7, 8)]
     document = json.loads(path.read_text())
     assert document["summary"]["spur, calm, each 3 s"]["right"] == pytest.approx(
         {"value": 0.5, "low": 0.15, "high": 0.85, "n": 4}, abs=0.01

@@ -190,6 +190,12 @@ def _paused(page: Page, server: PlayedServer) -> None:
     show_mode(page, server, controller("PAUSED", reason=reasons.unwatched(2.0, 1.5)))
 
 
+def _whole_vine(page: Page, server: PlayedServer) -> None:
+    _places(page, server)
+    page.locator("#open-vine").click()
+    expect(page.locator("rp-vine-sheet .vine-card").first).to_be_visible()
+
+
 def _preview(page: Page, server: PlayedServer) -> None:
     working(page, server)
     cuts = tuple(
@@ -431,6 +437,7 @@ STATES: dict[str, State] = {
     "why-rejected": _why_rejected,
     "by-hand": _by_hand,
     "places": _places,
+    "whole-vine": _whole_vine,
     "preview": _preview,
     "preview-expired": _preview_expired,
     "running": _running,

@@ -296,32 +296,6 @@ def test_a_cut_of_unknown_outcome_is_answered_by_who_has_looked(page: Page, serv
     expect(page.locator(".review-reasons")).to_be_hidden()
 
 
-def test_all_sure_cuts_are_accepted_after_their_number_and_the_least_sure_one_was_told(
-    page: Page, server: DecidingServer
-) -> None:
-    rows = [point(number, "PROPOSED", spur=number) for number in (1, 2, 3)]
-    unsure = msgspec.structs.replace(rows[2].point, confidence=0.62)
-    least = msgspec.structs.replace(rows[1].point, confidence=0.829)
-    show(server, rows[0], msgspec.structs.replace(rows[1], point=least), msgspec.structs.replace(rows[2], point=unsure))
-    looking_at(page, "p1")
-    page.locator("#accept-all").click()
-    expect(page.locator(".accept-all")).to_contain_text("Accept 2 cuts? The least sure one is 82 % sure.")
-    assert server.posted == []
-    page.get_by_role("button", name="Cancel").click()
-    expect(page.locator(".accept-all")).to_be_hidden()
-    page.locator("#accept-all").click()
-    page.locator("#accept-all-yes").click()
-    until(page, lambda: server.posted == [("/api/points/accept-all", {"confidence": 0.8})])
-    server.put(*(became(row, "ACCEPTED") for row in server.points[:2]))
-    expect(mark(page, "p2")).to_have_attribute("data-status", "accepted")
-    # Undone where nothing has happened since.
-    server.put(became(server.points[1], "DONE"))
-    expect(mark(page, "p2")).to_have_attribute("data-status", "done")
-    page.locator("#undo").click()
-    until(page, lambda: server.state_of("p1") == "PROPOSED")
-    assert [path for path, _ in server.posted[1:]] == ["/api/points/p1/reconsider"]
-
-
 @pytest.mark.alone  # It is about time: how long the page keeps a person waiting.
 def test_thirty_four_cuts_take_thirty_four_presses_and_forty_seconds_at_a_second_each(
     page: Page, server: DecidingServer

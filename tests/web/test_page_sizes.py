@@ -90,6 +90,18 @@ def test_every_screen_fits_every_window(page: Page, server: PlayedServer, subtes
                 fits(page, width, height)
 
 
+def test_a_whole_vine_fits_every_window(page: Page, server: PlayedServer, subtests: pytest.Subtests) -> None:
+    STATES["whole-vine"](page, server)
+    for width, height in SIZES:
+        page.set_viewport_size({"width": width, "height": height})
+        with subtests.test(size=f"{width}x{height}"):
+            fits(page, width, height)
+            assert page.locator("#vine-accept").evaluate(SEEN)[1] >= 44
+            # A picture is whole in sight, so that it counts as seen.
+            picture = page.locator(".vine-card rp-cut-picture").first
+            assert picture.evaluate(SEEN)[1] >= 0.9 * box_of(picture)["height"]
+
+
 @pytest.mark.parametrize("language", ["de", "fr"])
 def test_every_screen_fits_in_languages_of_long_words(
     page: Page, server: PlayedServer, subtests: pytest.Subtests, language: str

@@ -1,11 +1,9 @@
 // The screen for decisions: one picture at a time, a press a decision, the next one by itself.
-// Keys: A accept, R leave, arrows, Z undo, N by hand, L look again, + and − zoom.
+// Keys: A accept, R leave, arrows, Z undo, N by hand, L look again, V the whole vine, + and − zoom.
 
 import { whyNot } from "../js/control/allowed.js";
 import {
   accept,
-  acceptAll,
-  confidentPoints,
   decisions,
   explain,
   isUnknown,
@@ -20,22 +18,24 @@ import {
 } from "../js/control/decisions.js";
 import { nextStep } from "../js/control/next-step.js";
 import { placePoint, placing, setPlacing, whyNoPlacing } from "../js/control/placing.js";
-import { changes, current, isOpen, itemOf, items, leavePlace, look, openAfter, step, whileSent } from "../js/control/review.js";
+import { changes, current, isOpen, itemOf, items, leavePlace, look, ofVine, openAfter, pathOf, step, versionOf, whileSent } from "../js/control/review.js";
 import { isTyping } from "../js/control/stop.js";
 import { ask } from "../js/link/api.js";
-import { SURE, TEXT_MAX_LENGTH } from "../js/link/messages.js";
-import { fetchPicture } from "../js/link/pictures.js";
+import { TEXT_MAX_LENGTH } from "../js/link/messages.js";
+import { cutOn, fetchPicture } from "../js/link/pictures.js";
 import { link, now, pageState, points, showToast, staleWords } from "../js/state/page-state.js";
 import { reason, reasonText } from "../js/state/reasons.js";
 import { drawOn } from "../js/state/signals.js";
 import { counted, joined, labelOf, text } from "../js/state/texts.js";
 import { element, setAttribute, setEnabled, setText } from "../js/views/dom.js";
 import { icon } from "../js/views/icons.js";
+import { keepsWords, pictureWords, placeName } from "../js/views/item-words.js";
 import { setStatus } from "../js/views/point-status.js";
 import { planWords, robotWords } from "../js/views/plan-words.js";
 import { RpAdjust } from "./rp-adjust.js";
 import { RpCutPicture } from "./rp-cut-picture.js";
 import { stateWords } from "./rp-point-strip.js";
+import { RpVineSheet } from "./rp-vine-sheet.js";
 import "./rp-order.js";
 import "./rp-rule.js";
 
@@ -56,8 +56,6 @@ const CHANGED_MS = 700;
 const TURNED_MS = 200;
 /** A moved cut is drawn anew by perception within this time (ms). */
 const MOVED_MS = 3000;
-/** From these confidences on a point is "sure", "fairly sure". */
-const FAIRLY = 0.6;
 
 class RpReview extends HTMLElement {
   /** What is looked at, as it was drawn. @type {Item|null} */
@@ -79,9 +77,12 @@ class RpReview extends HTMLElement {
     if (this.picture) return;
     this.picture = new RpCutPicture();
     this.adjust = new RpAdjust();
+    this.sheet = new RpVineSheet();
     this.build(this.picture, this.adjust);
     this.picture.addEventListener("place", (event) => void this.place(/** @type {CustomEvent} */ (event).detail));
     this.picture.addEventListener("move-cut", (event) => void this.moveCut(/** @type {CustomEvent} */ (event).detail.along));
+    this.sheet.addEventListener("closed", (event) => this.closeVine(/** @type {CustomEvent} */ (event).detail.key));
+    current.subscribe((key) => this.sheet?.close(key));
     window.addEventListener("keydown", (event) => this.key(event));
     drawOn([points, pageState, link, now, current, changes, placing, decisions], () => this.draw());
     // On a telephone the button is below the picture that is tapped then.
@@ -138,9 +139,10 @@ class RpReview extends HTMLElement {
         adjust,
         document.createElement("rp-rule"),
         document.createElement("rp-order"),
-        element("div", { class: "review-tools" }, undoButton(() => void this.undo()), addByHand(), ...acceptEvery()),
+        element("div", { class: "review-tools" }, undoButton(() => void this.undo()), addByHand(), openVine(() => this.openVine())),
       ),
       this.empty,
+      /** @type {RpVineSheet} */ (this.sheet),
       document.createElement("rp-point-strip"),
     );
   }
@@ -217,14 +219,10 @@ class RpReview extends HTMLElement {
    */
   showPicture(item, picture) {
     const { row } = item;
-    const cut = picture?.drawing.cuts.find((each) => each.point_id === row?.point.point_id) ?? null;
-    if (!picture || (row && !cut)) {
-      this.picture?.show(null, null, text("picture.none"));
-      return "none";
-    }
-    const newest = !row || !cut || cut.revision >= row.point.revision;
-    this.picture?.show(picture, newest ? cut : null, row ? text("picture.of", { point: nameOf(row) }) : placeName(item));
-    return newest ? "shown" : "older";
+    const { cut, pictured } = cutOn(picture, row);
+    if (pictured === "none") this.picture?.show(null, null, text("picture.none"));
+    else this.picture?.show(picture, cut, pictureWords(item));
+    return pictured;
   }
 
   // --- what is told of it ---
@@ -359,7 +357,7 @@ class RpReview extends HTMLElement {
     const about = decisions.get().at(-1)?.about ?? "";
     this.explain(null);
     await undo();
-    if (about && itemOf(about)) look(about);
+    if (about && itemOf(about) && this.sheet?.hidden !== false) look(about);
   }
 
   askLook() {
@@ -378,6 +376,23 @@ class RpReview extends HTMLElement {
     const moved = row && (await move(row, Math.round(1000 * along)));
     // Until the moved cut is drawn.
     window.setTimeout(() => this.picture?.putBack(), moved ? MOVED_MS : 0);
+  }
+
+  // --- a whole vine ---
+
+  openVine() {
+    const vine = vineToDecide();
+    if (vine === 0) return;
+    this.explain(null);
+    setAttribute(this, "data-vine", String(vine));
+    this.sheet?.open(vine);
+  }
+
+  /** @param {string} key What is looked at now. */
+  closeVine(key) {
+    setAttribute(this, "data-vine", "");
+    if (key && key !== current.get()) look(key);
+    /** @type {HTMLElement|null} */ (this.querySelector("#open-vine"))?.focus();
   }
 
   // --- why it was left ---
@@ -429,6 +444,7 @@ class RpReview extends HTMLElement {
       a: () => void this.accept(),
       r: () => void this.leave(),
       z: () => whyNoUndo() === null && void this.undo(),
+      v: () => this.openVine(),
       n: () => whyNoPlacing() === null && setPlacing(!placing.get()),
       l: () => this.lookAgain?.hidden === false && this.lookAgain.click(),
     };
@@ -441,10 +457,18 @@ class RpReview extends HTMLElement {
       "+": () => this.picture?.zoomTo(this.picture.zoom * 1.5),
       "-": () => this.picture?.zoomTo(this.picture.zoom / 1.5),
     };
-    const act = once[key] ?? (slides ? undefined : repeated[key]);
+    /** @type {Readonly<Record<string, () => void>>} */
+    const ofVine = {
+      a: () => void this.sheet?.accept(),
+      r: () => void this.sheet?.leave(),
+      z: once.z,
+      v: () => this.sheet?.close(),
+      Escape: () => this.sheet?.close(),
+    };
+    const act = this.sheet?.hidden === false ? ofVine[key] : (once[key] ?? (slides ? undefined : repeated[key]));
     if (!act) return;
     event.preventDefault();
-    if (key in once && event.repeat) return;
+    if (!(key in repeated) && event.repeat) return;
     act();
   }
 }
@@ -466,63 +490,20 @@ function addByHand() {
   return button;
 }
 
-/** Accepting all sure cuts at once: the first press tells how many and how sure the least sure one is, the second does it. */
-function acceptEvery() {
-  const open = element("button", { id: "accept-all", text: text("review.accept_all") });
-  const words = element("p");
-  const yes = element("button", { id: "accept-all-yes", class: "primary" });
-  const no = element("button", { text: text("review.cancel") });
-  const box = element("div", { class: "accept-all", attributes: { role: "alertdialog", "aria-label": text("review.accept_all") } }, words, yes, no);
-  box.hidden = true;
-  const show = (/** @type {boolean} */ shown) => {
-    box.hidden = !shown;
-    draw();
-    if (shown) yes.focus();
-  };
-  open.addEventListener("click", () => show(true));
-  no.addEventListener("click", () => show(false));
-  yes.addEventListener("click", () => {
-    show(false);
-    void acceptAll();
+/** Look at all of a vine at once. @param {() => void} act */
+function openVine(act) {
+  const button = element("button", { id: "open-vine", text: text("review.whole_vine"), onclick: act });
+  drawOn([points, current, changes, pageState, link, now], () => {
+    setEnabled(button, vineToDecide() === 0 ? reason("none_proposed") : null, text("review.whole_vine_hint"));
   });
-  box.addEventListener("keydown", (event) => event.key === "Escape" && show(false));
-  const draw = () => {
-    const sure = confidentPoints();
-    const none = sure.length === 0 ? reason("none_so_confident", { confidence: SURE }) : null;
-    const why = whyNot("AcceptAll") ?? none;
-    for (const button of [open, yes]) setEnabled(button, why, text("review.accept_all_hint"));
-    if (none) box.hidden = true;
-    if (box.hidden) return;
-    const least = Math.floor(100 * Math.min(...sure.map((row) => row.point.confidence)) + 1e-9);
-    setText(words, counted("review.accept_all_ask", sure.length, { least }));
-    setText(yes, counted("review.accept_all_yes", sure.length));
-  };
-  drawOn([points, pageState, link, now], draw);
-  return [open, box];
+  return button;
 }
 
-/** @param {Item} item */
-function pathOf({ row, vine, spur }) {
-  return row ? `api/points/${encodeURIComponent(row.point.point_id)}` : `api/spurs/${vine}/${spur}`;
-}
-
-/** What makes it another cut. A restarted perception reuses ids: the hash distinguishes the points. @param {Item} item */
-function versionOf({ row, sites }) {
-  return row ? `${row.point.revision} ${row.point.digest}` : sites.map((site) => site.reason.code).join();
-}
-
-/** @param {Item} item */
-function placeName({ vine, spur }) {
-  return text("queue.group", { vine, spur });
-}
-
-/** @param {PagePoint} row */
-function keepsWords({ point }) {
-  const sure = point.confidence >= SURE ? "sure" : point.confidence >= FAIRLY ? "fairly" : "unsure";
-  const what = text(`details.kind.${point.kind}`);
-  const parts = [what, counted("review.keeps", point.nodes_kept), text(`review.${sure}`)];
-  // A line ends between two of them alone.
-  return parts.map((each) => each.replaceAll(" ", "\u00a0")).join("\u00a0· ");
+/** The vine that is looked at if something of it can be decided at once, else the next such one; 0 without one. */
+function vineToDecide() {
+  const here = itemOf(current.get());
+  const vines = [here, ...openAfter(here)].map((item) => item?.vine ?? 0);
+  return vines.find((vine) => Object.values(ofVine(vine)).some((some) => some.length > 0)) ?? 0;
 }
 
 /**

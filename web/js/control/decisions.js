@@ -5,7 +5,7 @@ import { SURE } from "../link/messages.js";
 import { points, say } from "../state/page-state.js";
 import { pointNames } from "../state/point-names.js";
 import { signal } from "../state/signals.js";
-import { counted, text } from "../state/texts.js";
+import { text } from "../state/texts.js";
 import { whyNot, whyNotPoint, whyNothingOf } from "./allowed.js";
 import { reason, saidText } from "../state/reasons.js";
 
@@ -56,7 +56,7 @@ export function whyNotReject(row) {
 /** @param {PagePoint} row */
 export async function accept(row) {
   if (isUnknown(row)) return resolve(row, "DONE", "seen by eye");
-  const done = await send(row, "accepting", "accept", { revision: row.point.revision, digest: row.point.digest });
+  const done = await sendAcceptance(row);
   if (done) pushUndo(text("undo.accepting", { point: nameOf(row) }), () => restore(row), row.point.point_id);
   return done;
 }
@@ -88,7 +88,7 @@ export function nameOf({ point }) {
 }
 
 /**
- * A proposal below the confidence for accepting all at once.
+ * A proposal below the confidence for accepting it with others at once.
  *
  * @param {PagePoint} row
  */
@@ -96,24 +96,24 @@ export function isUncertain(row) {
   return row.entry.state === "PROPOSED" && row.point.confidence < SURE;
 }
 
-/** Proposed points that "Accept all" covers. */
-export function confidentPoints() {
-  return (points.get()?.points ?? []).filter((row) => row.entry.state === "PROPOSED" && !isUncertain(row));
+/**
+ * Accept a point as it was shown: the controller refuses another one.
+ *
+ * @param {PagePoint} row
+ */
+export function sendAcceptance(row) {
+  return send(row, "accepting", "accept", { revision: row.point.revision, digest: row.point.digest });
 }
 
-/** Accept all confident points. */
-export async function acceptAll() {
-  const open = confidentPoints();
-  const done = await ask(text("decision.accepting_all"), "api/points/accept-all", { confidence: SURE });
-  if (done) {
-    pushUndo(counted("undo.accepted", open.length), async () => {
-      // Points that were cut or decided again since are left alone.
-      const accepted = open.map((row) => now(row)).filter(isAccepted);
-      const back = await Promise.all(accepted.map((row) => row && send(row, "reconsidering", "reconsider", {})));
-      return back.every(Boolean);
-    });
-  }
-  return done;
+/**
+ * Take back the acceptance of these points; what was cut or decided again since is left alone.
+ *
+ * @param {readonly PagePoint[]} rows
+ */
+export async function takeBack(rows) {
+  const accepted = rows.map((row) => now(row)).filter(isAccepted);
+  const back = await Promise.all(accepted.map((row) => row && send(row, "reconsidering", "reconsider", {})));
+  return back.every(Boolean);
 }
 
 /**
@@ -177,9 +177,7 @@ export function pushUndo(words, back, about = "") {
  */
 async function restore(before) {
   const { state, reason } = before.entry;
-  if (isAccepted(before)) {
-    return send(before, "accepting", "accept", { revision: before.point.revision, digest: before.point.digest });
-  }
+  if (isAccepted(before)) return sendAcceptance(before);
   if (state === "REJECTED") return send(before, "rejecting", "reject", { reason: saidText(reason) });
   return send(before, "reconsidering", "reconsider", {});
 }

@@ -4,8 +4,8 @@ import { ask } from "../link/api.js";
 import { points, selected } from "../state/page-state.js";
 import { statusOf } from "../state/point-status.js";
 import { signal } from "../state/signals.js";
-import { text } from "../state/texts.js";
-import { pushUndo } from "./decisions.js";
+import { counted, text } from "../state/texts.js";
+import { isUncertain, pushUndo, sendAcceptance, takeBack } from "./decisions.js";
 import { isFollowed, selectAndReveal } from "./selection.js";
 
 /** @typedef {import("../link/messages.js").PagePoint} PagePoint */
@@ -108,6 +108,16 @@ export function openAfter(after) {
   return [...round.filter((item) => !canWait(item)), ...round.filter(canWait)];
 }
 
+/** Where the picture of an item is. @param {Item} item */
+export function pathOf({ row, vine, spur }) {
+  return row ? `api/points/${encodeURIComponent(row.point.point_id)}` : `api/spurs/${vine}/${spur}`;
+}
+
+/** What makes it another cut. A restarted perception reuses ids: the hash distinguishes the points. @param {Item} item */
+export function versionOf({ row, sites }) {
+  return row ? `${row.point.revision} ${row.point.digest}` : sites.map((site) => site.reason.code).join();
+}
+
 /** Look at an item: the views go there. @param {string} key */
 export function look(key) {
   current.set(key);
@@ -158,11 +168,54 @@ function stateOf(key) {
 }
 
 /** Leave a place as it is: nothing is cut there. @param {Item} item */
-export async function leavePlace({ key, vine, spur }) {
-  const leave = (/** @type {boolean} */ left) => ask(text("command.LeaveSite"), "api/sites/leave", { vine, spur, left });
-  const done = await leave(true);
-  if (done) pushUndo(text("review.undo_place", { vine, spur }), () => leave(false), key);
+export async function leavePlace(item) {
+  const done = await sendLeft(item, true);
+  if (done) pushUndo(text("review.undo_place", { vine: item.vine, spur: item.spur }), () => sendLeft(item, false), item.key);
   return done;
+}
+
+/**
+ * @param {Item} item
+ * @param {boolean} left Or to be decided again.
+ */
+function sendLeft({ vine, spur }, left) {
+  return ask(text("command.LeaveSite"), "api/sites/leave", { vine, spur, left });
+}
+
+// --- a whole vine ---
+
+/**
+ * Cuts of a vine that perception is sure of, and its undecided places: what a person may decide about at once.
+ *
+ * @param {number} vine
+ */
+export function ofVine(vine) {
+  const open = items().filter((item) => item.vine === vine && isOpen(item));
+  const cuts = open.filter(({ row, status }) => row !== null && status === "proposed" && !isUncertain(row));
+  return { cuts, places: open.filter(({ row }) => row === null) };
+}
+
+/**
+ * Accept points, each as it was shown. One that has changed since is refused with its reason; one undo takes all back.
+ *
+ * @param {readonly PagePoint[]} rows
+ */
+export async function acceptAll(rows) {
+  const done = await Promise.all(rows.map((row) => whileSent(keyOfPoint(row), sendAcceptance(row))));
+  const accepted = rows.filter((_, k) => done[k]);
+  if (accepted.length > 0) pushUndo(counted("undo.accepted", accepted.length), () => takeBack(accepted));
+}
+
+/** Leave places as they are; one undo takes all back. @param {readonly Item[]} places */
+export async function leaveAll(places) {
+  const done = await Promise.all(places.map((item) => whileSent(item.key, sendLeft(item, true))));
+  const left = places.filter((_, k) => done[k]);
+  if (left.length === 0) return;
+  pushUndo(counted("undo.left", left.length), async () => {
+    const still = left.filter(({ key }) => itemOf(key)?.status === "left");
+    const back = await Promise.all(still.map((item) => sendLeft(item, false)));
+    return back.every(Boolean);
+  });
 }
 
 // A point that is chosen anywhere is looked at. The work does not take a picture away under a press.

@@ -25,6 +25,20 @@ export async function fetchPicture(of) {
 }
 
 /**
+ * The cut of a point on a picture, if the picture shows this cut and not an older one, or none.
+ *
+ * @param {CutPicture|null} picture
+ * @param {import("./messages.js").PagePoint|null} row Null for a place without a point.
+ * @returns {{ cut: import("./messages.js").DrawnCut|null, pictured: "shown"|"older"|"none" }}
+ */
+export function cutOn(picture, row) {
+  const cut = picture?.drawing.cuts.find((each) => each.point_id === row?.point.point_id) ?? null;
+  if (!picture || (row && !cut)) return { cut: null, pictured: "none" };
+  const newest = !row || !cut || cut.revision >= row.point.revision;
+  return newest ? { cut, pictured: "shown" } : { cut: null, pictured: "older" };
+}
+
+/**
  * The points of a spur share an image.
  *
  * @param {string} path

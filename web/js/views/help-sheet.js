@@ -12,6 +12,7 @@ const KEYS = Object.freeze([
   { does: "decide", keys: ["A", "R"] },
   { does: "undo", keys: ["Z"] },
   { does: "step", keys: ["←", "→"] },
+  { does: "vine", keys: ["V"] },
   { does: "add", keys: ["N"] },
   { does: "camera", keys: ["1", "2", "3", "4"] },
   { does: "measure", keys: ["M"] },
