@@ -120,14 +120,22 @@ class Card {
     setText(this.name, text("review.spur", { spur: item.spur }));
     setText(this.words, item.row ? cutWords(item.row.point) : item.sites.map((site) => reasonText(site.reason)).join(" "));
     setIcon(this.out, this.isOut ? "add" : "REJECTED");
-    for (const [button, key] of /** @type {const} */ ([[this.out, this.isOut ? "review.put_back" : "review.take_out"], [this.large, "review.show"]])) {
-      setAttribute(button, "aria-label", `${text(key)}: ${name}`);
-      setAttribute(button, "title", text(key));
-    }
+    nameButton(this.out, text(this.isOut ? "review.put_back" : "review.take_out"), name);
+    nameButton(this.large, text("review.show"), name);
     setAttribute(this.node, "data-out", this.isOut ? "yes" : "no");
     setAttribute(this.node, "data-seen", this.isSeen ? "yes" : "no");
     this.node.hidden = !isOpen(item);
   }
+}
+
+/**
+ * @param {Element} button
+ * @param {string} does
+ * @param {string} name Of what it does that to.
+ */
+function nameButton(button, does, name) {
+  setAttribute(button, "aria-label", `${does}: ${name}`);
+  setAttribute(button, "title", does);
 }
 
 export class RpVineSheet extends HTMLElement {
