@@ -81,6 +81,8 @@ def test_one_press_accepts_the_sure_cuts_as_they_are_shown_and_another_leaves_th
     assert server.posted == []
     page.get_by_role("button", name="Accept 2 cuts").click()
     until(page, lambda: asked(server, "accept") == {row.point.point_id: shown(row) for row in server.points[:2]})
+    expect(mark(page, "p2")).to_have_attribute("data-status", "accepted")
+    expect(mark(page, "p2")).not_to_have_class("strip-mark sent")
     expect(card(page, "p1")).to_be_hidden()
     page.get_by_role("button", name="Leave 2 places").click()
     # Nothing is left for a press here: the unsure cut is decided by itself.

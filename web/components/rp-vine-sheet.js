@@ -5,7 +5,7 @@
 import { whyNot } from "../js/control/allowed.js";
 import { nameOf } from "../js/control/decisions.js";
 import { whyNoPlacing } from "../js/control/placing.js";
-import { acceptAll, changes, isOpen, leaveAll, ofVine, openAfter, pathOf, versionOf } from "../js/control/review.js";
+import { acceptAll, changes, leaveAll, ofVine, openAfter, pathOf, versionOf } from "../js/control/review.js";
 import { cutOn, fetchPicture } from "../js/link/pictures.js";
 import { link, now, pageState, points } from "../js/state/page-state.js";
 import { reason, reasonText } from "../js/state/reasons.js";
@@ -124,7 +124,6 @@ class Card {
     nameButton(this.large, text("review.show"), name);
     setAttribute(this.node, "data-out", this.isOut ? "yes" : "no");
     setAttribute(this.node, "data-seen", this.isSeen ? "yes" : "no");
-    this.node.hidden = !isOpen(item);
   }
 }
 
@@ -144,7 +143,7 @@ export class RpVineSheet extends HTMLElement {
   cards = new Map();
 
   connectedCallback() {
-    if (this.childElementCount > 0) return;
+    if (this.scroller) return;
     this.hidden = true;
     this.heading = element("h2", { attributes: { tabindex: "-1" } });
     this.told = element("p", { attributes: { role: "status" } });
@@ -155,11 +154,11 @@ export class RpVineSheet extends HTMLElement {
     this.acceptButton = element("button", { id: "vine-accept", onclick: () => void this.accept() });
     this.leaveButton = element("button", { id: "vine-leave", onclick: () => void this.leave() });
     const close = element("button", { id: "vine-close", text: text("sheet.close"), onclick: () => this.close() });
-    this.append(
+    this.content = [
       element("div", { class: "vine-head" }, this.heading, this.told, close),
       this.scroller,
       element("div", { class: "vine-decide" }, this.leaveButton, this.acceptButton),
-    );
+    ];
     this.sights = new IntersectionObserver(
       (all) => {
         for (const { target, intersectionRatio } of all) this.cardOf(target)?.sight(intersectionRatio >= IN_SIGHT);
@@ -178,6 +177,7 @@ export class RpVineSheet extends HTMLElement {
   open(vine) {
     this.vine = vine;
     this.hidden = false;
+    this.replaceChildren(...(this.content ?? []));
     this.draw();
     this.scroller?.scrollTo(0, 0);
     this.heading?.focus();
@@ -192,6 +192,7 @@ export class RpVineSheet extends HTMLElement {
     this.sights?.disconnect();
     this.cuts?.replaceChildren();
     this.places?.replaceChildren();
+    this.replaceChildren();
     this.dispatchEvent(new CustomEvent("closed", { detail: { key: key ?? openAfter(undefined)[0]?.key ?? "" } }));
   }
 
@@ -200,7 +201,11 @@ export class RpVineSheet extends HTMLElement {
     const { cuts, places } = ofVine(this.vine);
     this.follow(this.cuts, cuts);
     this.follow(this.places, places);
-    for (const card of this.cards.values()) card.draw();
+    const open = new Set([...cuts, ...places].map(({ key }) => key));
+    for (const [key, card] of this.cards) {
+      card.node.hidden = !open.has(key);
+      card.draw();
+    }
     if (this.placesHead) this.placesHead.hidden = places.length === 0;
     const unseen = this.chosen(cuts).filter((card) => !card.isSeen).length;
     setText(/** @type {Element} */ (this.heading), text("review.vine", { vine: this.vine }));
