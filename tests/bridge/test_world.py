@@ -165,6 +165,20 @@ def test_the_base_pitches_and_rolls_over_bumps_and_leans_on_a_slope_across() -> 
     assert roll == pytest.approx(draw_errors(STORM, 2).slope[1], abs=2e-3)
 
 
+@pytest.mark.parametrize(("preset", "seed"), [("field", 5), ("field", 2604), ("storm", 3), ("storm", 11)])
+def test_bumps_rock_the_base_and_do_not_strike_it(preset: str, seed: int) -> None:
+    """The arm takes it for touch when its foot accelerates: nothing may touch it within hundredths of a second."""
+    sim, felt = robot(PRESETS[preset], seed=seed), []
+    drive(sim, 0.8)
+    for _ in range(1500):
+        drive(sim, 0.001)
+        torque = sim.read().external_torque
+        assert torque is not None
+        felt.append(torque)
+    jumps = np.abs(np.array(felt)[20:] - np.array(felt)[:-20])
+    assert jumps[:, :4].max() < 2.0 and jumps[:, 4:].max() < 0.5
+
+
 def test_on_a_slope_the_base_stands_still() -> None:
     sim = robot(only(("slope_along",), "storm"))
     drive(sim, 1.0, 0.0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bridge.sim.vineyard.row import Rod
-from bridge.sim.world.config import CALM, only
+from bridge.sim.world.config import PRESETS, only
 from controller.config import ControllerConfig
 from controller.motion.contact import Spots
 from rolling_panda import commands as intents
@@ -125,11 +125,9 @@ def test_in_automatic_work_a_post_that_nobody_saw_stops_it_before_the_tracking_e
     assert not any(at > loop.now - 1.0 for at, *_ in loop.touches)
 
 
-@pytest.mark.parametrize("preset", ["calm", "field"])
-def test_work_with_nothing_in_the_way_does_not_stop(preset: str) -> None:
-    from bridge.sim.world.config import PRESETS
-
-    loop = ContactWorld(world=PRESETS[preset] if preset != "calm" else CALM, seed=3)
+@pytest.mark.parametrize(("preset", "seed"), [("calm", 3), ("field", 3), ("field", 2604), ("storm", 3)])
+def test_work_with_nothing_in_the_way_does_not_stop(preset: str, seed: int) -> None:
+    loop = ContactWorld(world=PRESETS[preset], seed=seed)
     loop.work()
     for _ in range(20):
         loop.run(1.0)

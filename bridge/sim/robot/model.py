@@ -2,7 +2,8 @@
 
 Physics assumptions:
 - Hard floor. Each driven wheel has one contact point below its centre (a sphere of the rolling radius), so that the
-  track is exact and turning does not scrub. Uneven ground is a plane under each wheel, which follows the ground there.
+  track is exact and turning does not scrub. Uneven ground is a plane under each wheel, which follows the ground there
+  and gives way a little.
 - The caster's fork and wheel are bodies of their own.
 - The base has a free joint; only friction holds it.
 - Posts, trunks, cordons and wires are rigid. Canes and spurs are visible and can be cut, but do not collide.
@@ -41,6 +42,10 @@ _WHEEL_ROTOR = 0.1
 # Stiff: a loaded wheel penetrates the floor by less than 1 µm.
 _FLOOR_SOLREF = (0.002, 1.0)
 _FLOOR_SOLIMP = (0.99, 0.999, 0.0001, 0.5, 2.0)
+# Tyre and soil of uneven ground together give way by about 0.1 mm. A plane differs by up to 1 µm from the next, 1 mm
+# farther: a wheel on stiff ground would lose it for a step, and strike it in the next.
+_SOIL_SOLREF = (0.01, 1.0)
+_SOIL_SOLIMP = (0.95, 0.95, 0.001, 0.5, 2.0)
 _RUBBER, _GRAVITY = 0.9, 9.81
 
 
@@ -141,6 +146,7 @@ def _add_ground(spec: Any) -> None:
         # Neither at the origin nor level: such a plane would not be moved.
         plane.pos, plane.quat = [0.0, 0.0, -1e-3], [1.0, 1e-3, 0.0, 0.0]
         _rubber(plane, _RUBBER)
+        plane.solref, plane.solimp, plane.priority = list(_SOIL_SOLREF), list(_SOIL_SOLIMP), 1
 
 
 def _plant(model: Any) -> Plant:
