@@ -99,7 +99,15 @@ class Controller:
         self._previews = PreviewManager(self._queue, self._journal, config.whole_body.hierarchy)
         permit = self._previews.permit
         self._movement = Movement(
-            config, robot_config, self._queue, self._event_log, run_id, self._known, method, permit
+            config,
+            robot_config,
+            self._queue,
+            self._event_log,
+            run_id,
+            self._known,
+            method,
+            permit,
+            self._plans.made_from,
         )
         self._postures = Postures(config.work, self._movement.body, self._movement.posture_check, self._journal)
         self._supervisor = Supervisor(config.supervision, self._movement, self._event_log, draw)
@@ -436,7 +444,7 @@ class Controller:
             q=None if measured is None else measured.in_map(movement.sequence.clear_of_canes(measured.q)),
             obstacles=() if obstacles is None else obstacles.message.capsules,
             at_rest=not movement.homing and self.mode != "TELEOP" and movement.at_rest,
-            working=self.mode == "AUTO",
+            working=self.mode == "AUTO" and not movement.sequence.idle,
             now=now,
             busy=movement.sequence.active,
             close_up_s=movement.sequence.close_up_s,

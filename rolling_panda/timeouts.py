@@ -125,6 +125,7 @@ _ALL: Final = (
     Limit("planner: settling", 0.3, "controller/planning/plan_manager.py:_SETTLED_S"),
     Limit("planner: pause", 2.0, "controller/planning/plan_manager.py:_PAUSE_S"),
     Limit("planner: pause after a failure", 10.0, "controller/planning/plan_manager.py:_AGAIN_S"),
+    Limit("planner: wait at the end of the work", 15.0, "controller/work/cutting.py:_PLAN_WAIT_S"),
     Limit("lease", 1.0, "controller/supervision/lease.py:LIFE_S"),
     Limit("reply of a command", topics.INTENT.timeout_s, "rolling_panda/topics.py:INTENT"),
     # The server, and its page.
@@ -267,6 +268,12 @@ RELATIONS: Final = (
     ),
     Relation(
         "planner: pause", "planner: pause after a failure", "a planner that fails is asked less often", strict=True
+    ),
+    Relation(
+        "planner: pause",
+        "planner: wait at the end of the work",
+        "before the work ends a plan from the last cut can be requested, made, and made again",
+        times=3,
     ),
     Relation(
         "lost close-up",

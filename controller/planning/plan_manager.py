@@ -69,7 +69,8 @@ class PlanManager:
             q: Configuration (12) now, None before the first measurement.
             obstacles: Current obstacles.
             at_rest: Whether the robot is at rest.
-            working: Whether the robot executes the queue, which moves it away from the start of the plan.
+            working: Whether the robot executes the queue, which moves it away from the start of the plan; False when no
+                point is left that can be reached.
             now: Monotonic time (s).
             busy: Current point of the work; empty without one.
             close_up_s: Time from the request of the last close-up to its result (s).
@@ -96,6 +97,11 @@ class PlanManager:
         self._asked = PlanRequest(self._number, q.copy(), accepted, tuple(obstacles), order, turned, close_up_s)
         self._check(why, True)
         return self._asked
+
+    def made_from(self, q: Array) -> bool:
+        """Whether the plan holds for a robot at rest at q (12, map), or none can be had."""
+        plan = self._plan
+        return plan is None or plan.failure is not None or (self.valid and place_changed(plan, q) is None)
 
     @property
     def cuts(self) -> dict[str, CutPlan] | None:

@@ -190,6 +190,8 @@ class Parts:
         post_cut_check: Check of the last cuts.
         blades: Orders the cuts.
         next_cut: Posture search for the next point.
+        planned_from: Whether the plan tells which points can be reached from a configuration (12, map); also True when
+            no plan can be had.
         ending: Reason to begin no further cut; None without one.
         cut_point: Point of the last cut; empty before the first.
         cut_at: Position of the tool at the last cut (3, m, odom).
@@ -204,6 +206,7 @@ class Parts:
     post_cut_check: PostCutCheck
     blades: Blades
     next_cut: NextCut
+    planned_from: Callable[[Array], bool]
     ending: m.Reason | None = None
     cut_point: str = ""
     cut_at: Array = field(default_factory=lambda: np.zeros(3))
@@ -361,8 +364,23 @@ class Stage(ABC):
 Step = tuple[Stage, StepResult]
 
 
+#: Longest wait for a plan at the end of the work (s).
+_PLAN_WAIT_S = 15.0
+
+
 class Rest(Stage):
-    """At rest: choose the next point and search its posture."""
+    """At rest: choose the next point and search its posture.
+
+    A point that the plan refused may be within reach from the last cut. So the work does not end on such a point before
+    a plan from there has refused it as well.
+    """
+
+    def __init__(self, parts: Parts) -> None:
+        """Nothing is waited for."""
+        super().__init__(parts)
+        self._since: float | None = None
+        #: Whether no point is left that can be reached.
+        self.idle = False
 
     def step(self, robot: Measured, now: float) -> Step:
         """One period."""
@@ -370,10 +388,19 @@ class Rest(Stage):
         xi, following = parts.saturation.ramp(robot.sent), parts.next_cut
         if following.search(robot.in_map(robot.q)):
             return Search(parts, following.point_id, following.accepted), StepResult(xi)
-        # The last cut may still have to be made once more.
+        self.idle = following.refused is None
         beyond = parts.queue.count("UNREACHABLE")
+        if beyond and self.idle and self._plan_due(robot, now):
+            return self, StepResult(xi)
+        # The last cut may still have to be made once more.
         summary = following.refused or (reasons.work_done_but(beyond) if beyond else reasons.work_done())
         return self, StepResult(xi, finished=not parts.post_cut_check.pending, summary=summary)
+
+    def _plan_due(self, robot: Measured, now: float) -> bool:
+        if self._parts.planned_from(robot.in_map(robot.q)):
+            return False
+        self._since = now if self._since is None else self._since
+        return now - self._since < _PLAN_WAIT_S
 
 
 class Escape(Stage):
@@ -740,11 +767,12 @@ class CutSequence:
         run_id: str,
         known: Known = lambda _: None,
         permit: Permit = lambda _: None,
+        planned_from: Callable[[Array], bool] = lambda _: True,
     ) -> None:
         """Bind the parts.
 
         `run_id` makes the cut ids of this start unique. `known` gives the planned cut of a point, and
-        `permit` the reason why the robot may not approach it.
+        `permit` the reason why the robot may not approach it. `planned_from` is as in `Parts`.
         """
         close_ups = CloseUpClient(config.work.close_up_timeout_s, _PICTURES, _BLIND_PICTURES)
         check = PostCutCheck(queue, close_ups, config.work.post_cut_check)
@@ -758,6 +786,7 @@ class CutSequence:
             check,
             Blades(config.work, queue, run_id, check.start),
             NextCut(search, queue, config.search_steps_each, known, permit),
+            planned_from,
         )
         self._stage: Stage = Rest(self._parts)
         self._survey: Survey | None = None
@@ -772,6 +801,11 @@ class CutSequence:
     def active(self) -> str:
         """Current point of the work; empty without one."""
         return self._stage.point_id
+
+    @property
+    def idle(self) -> bool:
+        """Whether no point is left that can be reached."""
+        return isinstance(self._stage, Rest) and self._stage.idle
 
     @property
     def in_canes(self) -> str:

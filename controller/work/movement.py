@@ -1,5 +1,7 @@
 """Motion sources by mode: cut sequence, teleoperation and homing. Permission is not decided here."""
 
+from collections.abc import Callable
+
 import numpy as np
 from msgspec import Struct
 
@@ -59,6 +61,7 @@ class Movement:
         known: Known,
         method: Method | None = None,
         permit: Permit = lambda _: None,
+        planned_from: Callable[[Array], bool] = lambda _: True,
     ) -> None:
         """Build the robot's model and the motion sources.
 
@@ -71,6 +74,8 @@ class Movement:
             known: Gives the planned cut of a point.
             method: Whole-body method in place of the configured one.
             permit: Gives the reason why the robot may not approach a point; None if it may.
+            planned_from: Whether the plan tells which points can be reached from a configuration (12, map); also True
+                when no plan can be had.
 
         Raises:
             ConfigError: There is no such method.
@@ -83,7 +88,9 @@ class Movement:
         search = PostureSearch(
             RobotModel(robot_config), config.work, config.whole_body.joint_margin, self._clearance.too_near
         )
-        self.sequence = CutSequence(config, search, body.follower, body.saturation, queue, run_id, known, permit)
+        self.sequence = CutSequence(
+            config, search, body.follower, body.saturation, queue, run_id, known, permit, planned_from
+        )
         self.posture_check = PostureCheck(RobotModel(robot_config), config.whole_body)
         check = self.posture_check
         self.teleoperation = Teleoperation(

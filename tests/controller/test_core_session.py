@@ -151,6 +151,28 @@ def test_a_point_that_the_plan_refuses_is_not_driven_to_and_the_ticket_says_why(
     assert p.robot.now < 15.0, "no time is spent on the refused one"
 
 
+def test_the_work_does_not_end_before_a_plan_from_the_last_cut_has_refused_what_is_left_too() -> None:
+    p = Planned((point("in", (0.5, 0.75, 1.05)), point("good", (1.4, 0.75, 1.05))), obstacles=(POST,))
+    p.accepted("in", "good").until_valid()
+    p.start()
+    p.robot.run(1.0)
+    assert entry(p.robot, "in").state == "UNREACHABLE"
+    # Seen from nearer, there is no post.
+    p.robot.obstacles = ()
+    finish(p.robot, 60.0)
+    assert [point_id for point_id, _ in p.robot.cuts] == ["good", "in"]
+    assert entry(p.robot, "in").state == "DONE" and p.robot.state.reason == reasons.work_done()
+
+
+def test_a_planner_that_does_not_answer_does_not_keep_the_work_from_ending() -> None:
+    p = Planned((point("in", (0.5, 0.75, 1.05)), point("good", (1.4, 0.75, 1.05))), obstacles=(POST,))
+    p.accepted("in", "good").until_valid()
+    p.after = 100_000
+    p.start()
+    finish(p.robot, 60.0)
+    assert entry(p.robot, "in").state == "UNREACHABLE" and p.robot.state.reason == reasons.work_done_but(1)
+
+
 def test_where_nothing_accepted_can_be_reached_no_work_begins_and_that_is_said() -> None:
     p = Planned((point("high", (0.6, 0.75, 2.4)),))
     p.accepted("high").until_valid()
