@@ -41,8 +41,9 @@ from rolling_panda.reasons import text_of
 from rolling_panda.resources import resource
 from tests.support.worlds.closed_loop import ClosedLoop
 
-#: A point in another state than these has ended: cut, given up, or void after a closer look.
-_OPEN: tuple[m.PointState, ...] = ("ACCEPTED", "CUTTING")
+#: A point in another state than these has ended: cut, given up, or void after a closer look. What a plan cannot reach
+#: may be reached by the plan from the last cut.
+_OPEN: tuple[m.PointState, ...] = ("ACCEPTED", "UNREACHABLE", "CUTTING")
 _SURVEY_S = 6.0
 _LOOK_S, _LIMIT_S = 3.0, 120.0
 #: Periods between two looks at what touches a cane.
@@ -255,14 +256,14 @@ def _work(loop: ClosedLoop, todo: list[str]) -> dict[str, float]:
     """Run until every point has ended or the work stands still. Returns simulated seconds a point."""
     durations: dict[str, float] = {}
     begin = loop.now
-    while len(durations) < len(todo):
 
-        def ended() -> set[str]:
-            return set(todo) - set(durations) - {entry.point_id for entry in loop.queue(*_OPEN)}
+    def ended() -> set[str]:
+        return set(todo) - set(durations) - {entry.point_id for entry in loop.queue(*_OPEN)}
 
-        if not loop.run_until(lambda: bool(ended()), _LIMIT_S):
+    while loop.run_until(lambda: bool(ended()) or loop.controller.mode != "AUTO", _LIMIT_S):
+        if not (now_ended := ended()):
             break
-        for point_id in ended():
+        for point_id in now_ended:
             durations[point_id] = loop.now - begin
             begin = loop.now
     loop.run(3.0)
