@@ -42,7 +42,7 @@ _WHEEL_ROTOR = 0.1
 # Stiff: a loaded wheel penetrates the floor by less than 1 µm.
 _FLOOR_SOLREF = (0.002, 1.0)
 _FLOOR_SOLIMP = (0.99, 0.999, 0.0001, 0.5, 2.0)
-# Tyre and soil of uneven ground together give way by about 0.1 mm. A plane differs by up to 1 µm from the next, 1 mm
+# Tyre and soil of uneven ground together give way by 0.04 to 0.2 mm. A plane differs by up to 1 µm from the next, 1 mm
 # farther: a wheel on stiff ground would lose it for a step, and strike it in the next.
 _SOIL_SOLREF = (0.01, 1.0)
 _SOIL_SOLIMP = (0.95, 0.95, 0.001, 0.5, 2.0)
