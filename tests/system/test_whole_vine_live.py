@@ -1,0 +1,41 @@
+"""A whole vine accepted in one press: real processes, real wire, real browser."""
+
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Request, expect
+
+from tests.support.operator_page import operator_page
+from tests.support.processes.live_robot import LiveRobot
+
+pytestmark = [pytest.mark.browser, pytest.mark.alone]
+
+
+def test_what_one_press_accepts_is_what_was_shown_and_one_press_takes_it_back(
+    tmp_path: Path, chromium_path: str
+) -> None:
+    sent: dict[str, str] = {}
+
+    def look(request: Request) -> None:
+        if request.url.endswith("/accept"):
+            sent[request.url.split("/")[-2]] = request.post_data_json["digest"]
+
+    def states() -> dict[str, tuple[str, str]]:
+        entries = [row["entry"] for row in robot.points()]
+        return {each["point_id"]: (each["state"], each["digest"]) for each in entries if each["point_id"] in sent}
+
+    with LiveRobot(tmp_path) as robot, operator_page(chromium_path, robot.link("ada")) as page:
+        page.on("request", look)
+        page.wait_for_selector('[data-cut][data-state="PROPOSED"]', timeout=90_000)
+        page.click('[data-tab="review"]')
+        expect(page.locator("#open-vine")).to_be_enabled(timeout=30_000)
+        page.keyboard.press("v")
+        expect(page.locator("#vine-accept")).to_be_enabled(timeout=30_000)
+        seen = page.locator('.vine-card[data-seen="yes"]').evaluate_all("all => all.map(each => each.dataset.key)")
+        page.keyboard.press("a")
+        robot.wait(lambda: sent and {state for state, _ in states().values()} == {"ACCEPTED"}, 20, "all to be accepted")
+        assert {*sent} <= {*seen}
+        assert states() == {name: ("ACCEPTED", digest) for name, digest in sent.items()}
+        page.keyboard.press("z")
+        robot.wait(lambda: {state for state, _ in states().values()} == {"PROPOSED"}, 20, "all to be proposed")
+        assert robot.refused() == []
