@@ -225,10 +225,10 @@ class Reviewer:
         shown: dict[str, m.PruningPoint] = {}
         end = self.loop.now + _LONGEST_LOOK_S
         while self.loop.now < end:
-            unseen = [point for point in self._sure().values() if shown.get(point.point_id) != point]
-            if not unseen:
+            known = {name: each.digest for name, each in shown.items()}
+            point = next((each for each in self._sure().values() if known.get(each.point_id) != each.digest), None)
+            if point is None:
                 break
-            point = unseen[0]
             self._glance(_CHANGED_S if point.point_id in shown else self.glance)
             shown[point.point_id] = point
         for _ in places:

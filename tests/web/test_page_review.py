@@ -214,6 +214,21 @@ def test_everything_is_undone_step_by_step_and_is_looked_at_again(page: Page, se
     expect(page.locator("#undo")).to_be_disabled()
 
 
+def test_what_was_decided_before_a_cut_is_not_offered_to_undo(page: Page, server: DecidingServer) -> None:
+    looking_at(page, "p1")
+    page.keyboard.press("a")
+    looking_at(page, "p3")
+    expect(page.locator("#undo")).to_be_enabled()
+    row = server.points[0]
+    server.put(msgspec.structs.replace(row, entry=msgspec.structs.replace(row.entry, state="FAILED_NOT_CUT")))
+    expect(page.locator("#undo")).to_be_disabled()
+    page.keyboard.press("r")
+    looking_at(page, "place-1-4")
+    page.locator("#undo").click()
+    looking_at(page, "p3")
+    assert server.posted[-1][0] == "/api/points/p3/reconsider"
+
+
 def test_a_cut_that_changes_while_one_looks_at_it_is_told_and_waits_for_another_look(
     page: Page, server: DecidingServer
 ) -> None:

@@ -7,6 +7,7 @@ import {
   decisions,
   explain,
   isUnknown,
+  lastDecision,
   move,
   nameOf,
   reject,
@@ -354,7 +355,7 @@ class RpReview extends HTMLElement {
   }
 
   async undo() {
-    const about = decisions.get().at(-1)?.about ?? "";
+    const about = lastDecision()?.about ?? "";
     this.explain(null);
     await undo();
     if (about && itemOf(about) && this.sheet?.hidden !== false) look(about);
@@ -475,8 +476,8 @@ class RpReview extends HTMLElement {
 
 function undoButton(/** @type {() => void} */ act) {
   const button = element("button", { id: "undo", text: text("queue.undo"), onclick: act });
-  drawOn([decisions, pageState, link, now], () => {
-    setEnabled(button, whyNoUndo(), text("queue.undo_hint", { words: decisions.get().at(-1)?.words ?? "" }));
+  drawOn([decisions, points, pageState, link, now], () => {
+    setEnabled(button, whyNoUndo(), text("queue.undo_hint", { words: lastDecision()?.words ?? "" }));
   });
   return button;
 }

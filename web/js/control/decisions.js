@@ -17,6 +17,8 @@ import { reason, saidText } from "../state/reasons.js";
  * @typedef {{ words: string, undo: () => Promise<boolean>, about: string }} Decision
  */
 
+/** From the order to cut on, what was decided of a point before stands. @type {readonly PointState[]} */
+const CUT = ["CUTTING", "DONE", "FAILED_NOT_CUT", "UNKNOWN"];
 /** Depth of the undo stack. */
 const MOST = 100;
 
@@ -148,17 +150,24 @@ export function judge(point, wrong) {
   return ask(what, `api/points/${encodeURIComponent(point)}/judge`, { wrong });
 }
 
+/** The last decision that can be undone; undefined without one. */
+export function lastDecision() {
+  const cut = points.get()?.points.filter(({ entry }) => CUT.includes(entry.state)) ?? [];
+  const cutNames = new Set(cut.map(({ point }) => point.point_id));
+  return decisions.get().filter(({ about }) => !cutNames.has(about)).at(-1);
+}
+
 /** Undo the last decision. */
 export async function undo() {
-  const last = decisions.get().at(-1);
+  const last = lastDecision();
   if (!last) return;
-  decisions.set(decisions.get().slice(0, -1));
+  decisions.set(decisions.get().filter((each) => each !== last));
   if (await last.undo()) say("info", text("undo.done", { words: last.words }));
 }
 
 /** Why there is nothing to undo. */
 export function whyNoUndo() {
-  return decisions.get().length === 0 ? reason("nothing_decided") : whyNot("ReconsiderPoint");
+  return lastDecision() ? whyNot("ReconsiderPoint") : reason("nothing_decided");
 }
 
 /**
