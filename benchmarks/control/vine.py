@@ -225,8 +225,9 @@ class Reviewer:
         shown: dict[str, m.PruningPoint] = {}
         end = self.loop.now + _LONGEST_LOOK_S
         while self.loop.now < end:
-            known = {name: each.digest for name, each in shown.items()}
-            point = next((each for each in self._sure().values() if known.get(each.point_id) != each.digest), None)
+            known = {(each.point_id, each.revision, each.digest) for each in shown.values()}
+            sure = self._sure().values()
+            point = next((each for each in sure if (each.point_id, each.revision, each.digest) not in known), None)
             if point is None:
                 break
             self._glance(_CHANGED_S if point.point_id in shown else self.glance)

@@ -69,7 +69,7 @@ def test_without_the_tests_it_says_what_is_missing(tmp_path: Path, monkeypatch: 
 
 
 @pytest.mark.browser
-@pytest.mark.processes
+@pytest.mark.alone
 def test_ended_while_its_demo_starts_it_leaves_nothing_behind(tmp_path: Path) -> None:
     port = str(free_port())
     words = ["pictures", "--part", "live", "--out", str(tmp_path), "--port", port]

@@ -40,6 +40,8 @@ class Saturation:
 class Sequence:
     """Drives for some periods, stands, cuts, and goes on, with the product's own blades."""
 
+    idle = False
+
     def __init__(self, config, queue, run_id, chance, permit):
         self._queue, self._chance, self._permit, self.close_up_s = queue, chance, permit, 0.0
         self.blades = Blades(config.work, queue, run_id)
@@ -60,6 +62,9 @@ class Sequence:
     def survey(self, distance):
         self.abort()
         self._survey = 20 if distance else 0
+
+    def continue_survey(self):
+        self.survey(1.0)
 
     def finish_cut_and_pause(self, why):
         self.ending = why
@@ -107,7 +112,9 @@ class Movement:
 
     chance = random.Random(0)
 
-    def __init__(self, config, robot_config, queue, lines, run_id, known, method=None, permit=lambda _: None):
+    def __init__(
+        self, config, robot_config, queue, lines, run_id, known, method=None, permit=lambda _: None, planned_from=None
+    ):
         self.queue, saturation = queue, Saturation()
         Movement.newest = self
         self._setpoints, self._saturation = Setpoints(saturation), saturation
