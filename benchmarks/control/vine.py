@@ -226,8 +226,10 @@ class Reviewer:
         end = self.loop.now + _LONGEST_LOOK_S
         while self.loop.now < end:
             known = {(each.point_id, each.revision, each.digest) for each in shown.values()}
-            sure = self._sure().values()
-            point = next((each for each in sure if (each.point_id, each.revision, each.digest) not in known), None)
+            unseen = (
+                each for each in self._sure().values() if (each.point_id, each.revision, each.digest) not in known
+            )
+            point = next(unseen, None)
             if point is None:
                 break
             self._glance(_CHANGED_S if point.point_id in shown else self.glance)
