@@ -5,6 +5,7 @@ import signal
 import subprocess
 import time
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 import httpx
@@ -73,7 +74,10 @@ def test_without_the_tests_it_says_what_is_missing(tmp_path: Path, monkeypatch: 
 def test_ended_while_its_demo_starts_it_leaves_nothing_behind(tmp_path: Path) -> None:
     port = str(free_port())
     words = ["pictures", "--part", "live", "--out", str(tmp_path), "--port", port]
-    bench = subprocess.Popen(python_command("benchmarks", words), env=child_environment(), stderr=subprocess.DEVNULL)
+    # A shell's background job ignores Ctrl-C, and so would what it starts.
+    heed = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    command = python_command("benchmarks", words)
+    bench = subprocess.Popen(command, env=child_environment(), stderr=subprocess.DEVNULL, preexec_fn=heed)
     started: list[psutil.Process] = []
 
     def serves() -> bool:
@@ -93,3 +97,4 @@ def test_ended_while_its_demo_starts_it_leaves_nothing_behind(tmp_path: Path) ->
         for each in (bench, *started):
             if each.poll() is None if isinstance(each, subprocess.Popen) else each.is_running():
                 each.kill()
+        bench.wait(10.0)
