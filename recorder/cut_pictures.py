@@ -10,7 +10,6 @@ from rolling_panda.cut_pictures import CloseUps, CutCloseUp, PictureFolder, box_
 from rolling_panda.messages.perception import Localisation
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.messages.types import Vector3
-from rolling_panda.model.map_frame import MapFrame
 from rolling_panda.model.robot import RobotModel
 
 #: The largest number of pictures of a recording.
@@ -64,7 +63,7 @@ def _close_ups(recording: Recording) -> list[CutCloseUp]:
         elif each.topic is topics.LOCALISATION:
             told = each.message()
             if isinstance(told, Localisation):
-                close_ups.where = MapFrame.told(told)
+                close_ups.where = close_ups.where.after(told)
         elif each.topic is topics.CAMERA and _NO_POINT not in each.data:
             frame = each.message()
             if isinstance(frame, CameraFrame) and frame.point_id:

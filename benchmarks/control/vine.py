@@ -254,7 +254,7 @@ class Reviewer:
         self.glances += 1
 
     def _accept(self, points: Iterable[m.PruningPoint]) -> None:
-        """Accept points as they were shown, and keep the answers and what is accepted after it."""
+        """Accept points as they were shown. Refusals and accepted entries are kept."""
         for shown in points:
             name = shown.point_id
             accept = intents.AcceptPoint(user=USER, point_id=name, revision=shown.revision, digest=shown.digest)

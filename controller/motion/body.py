@@ -2,7 +2,6 @@
 
 import math
 from collections import deque
-from contextlib import suppress
 
 import numpy as np
 
@@ -20,7 +19,6 @@ from controller.whole_body.two_rates import TwoRates
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.config import RobotConfig
-from rolling_panda.errors import ModelError
 from rolling_panda.messages.perception import Localisation, Obstacles
 from rolling_panda.messages.robot import JointState, Odometry
 from rolling_panda.model.differential_drive import NXI, Array, DifferentialDrive, Pose
@@ -158,7 +156,6 @@ class Body:
         self.measured: Measured | None = None
         #: Where odom is in map, as told last.
         self.frame = MapFrame()
-        self._localisation: Localisation | None = None
         #: Obstacles in odom.
         self.obstacles: Received[Obstacles] | None = None
         self._told: tuple[Received[Obstacles] | None, MapFrame] = None, self.frame
@@ -188,12 +185,8 @@ class Body:
     def _locate(self, inbox: Inbox) -> None:
         """Take in where odom is in map, and the obstacles in odom."""
         told, around = inbox.newest(Localisation), inbox.newest(Obstacles)
-        if told is not None and told.message is not self._localisation:
-            before, self._localisation = self._localisation, told.message
-            if before is None or before.T_map_odom != told.message.T_map_odom:
-                # A transform that is none changes nothing.
-                with suppress(ModelError):
-                    self.frame = MapFrame.told(told.message)
+        if told is not None:
+            self.frame = self.frame.after(told.message)
         if self._told != (around, self.frame):
             self._told, self.obstacles = (around, self.frame), around
             if around is not None and self.frame.T_map_odom is not None:

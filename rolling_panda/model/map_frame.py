@@ -6,10 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from rolling_panda.errors import ModelError
 from rolling_panda.messages.perception import Capsule, Localisation
-from rolling_panda.messages.types import Pose, Vector3
+from rolling_panda.messages.types import Pose
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import placement
+from rolling_panda.model.wire_values import vector3
 
 _ORIGIN = Pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
 
@@ -20,19 +22,21 @@ class MapFrame:
 
     Attributes:
         T_map_odom: The transform (pin.SE3); None for the identity.
+        pose: The same as a message.
     """
 
     T_map_odom: Any = None
+    pose: Pose = _ORIGIN
 
-    @classmethod
-    def told(cls, localisation: Localisation) -> "MapFrame":
-        """As perception has told it.
-
-        Raises:
-            ModelError: The quaternion is too far from unit length to mean a rotation.
-        """
-        T = localisation.T_map_odom
-        return cls() if T == _ORIGIN else cls(placement(T))
+    def after(self, localisation: Localisation) -> "MapFrame":
+        """As perception tells it now: the same object while the transform stays, or where its quaternion is none."""
+        pose = localisation.T_map_odom
+        if pose == self.pose:
+            return self
+        try:
+            return MapFrame() if pose == _ORIGIN else MapFrame(placement(pose), pose)
+        except ModelError:
+            return self
 
     def configuration_in_map(self, q: Array) -> Array:
         """The same configuration (12) with the base where it is in map. Height and tilt of the ground are left out."""
@@ -63,10 +67,10 @@ class MapFrame:
         ends = np.array([(each.start, each.end) for each in capsules]).reshape(-1, 3) @ T.rotation.T + T.translation
         return tuple(
             Capsule(
-                each.kind, _vector(start), _vector(end), each.start_radius, each.end_radius, each.vine, each.spur,
+                each.kind, vector3(start), vector3(end), each.start_radius, each.end_radius, each.vine, each.spur,
                 each.undecided,
             )
-            for each, (start, end) in zip(capsules, ends.reshape(-1, 2, 3).tolist(), strict=True)
+            for each, (start, end) in zip(capsules, ends.reshape(-1, 2, 3), strict=True)
         )  # fmt: skip
 
 
@@ -79,8 +83,3 @@ def _moved(T: Any, q: Array) -> Array:
     out[1] = T.translation[1] + s * q[0] + c * q[1]
     out[2] = q[2] + turned
     return out
-
-
-def _vector(position: list[float]) -> Vector3:
-    x, y, z = position
-    return x, y, z

@@ -10,7 +10,6 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,9 +19,8 @@ from rolling_panda import __version__, reasons, topics
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.commands import EvaluateRule, PlantRequest
-from rolling_panda.errors import ModelError, ServiceError
+from rolling_panda.errors import ServiceError
 from rolling_panda.messages.page import ProcessPresence
-from rolling_panda.messages.perception import Localisation
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.messages.supervision import Presence, StopState, TeleopTarget
 from rolling_panda.model.differential_drive import Array
@@ -99,7 +97,7 @@ class RobotLink:
         self.camera_state = transport.slot(topics.CAMERA_STATE)
         self.robot_calibration = transport.slot(topics.ROBOT_CALIBRATION)
         self._localisation = transport.slot(topics.LOCALISATION)
-        self._located: tuple[Localisation | None, MapFrame] = None, MapFrame()
+        self._map_frame = MapFrame()
         self.pictures = PictureStore()
         transport.subscribe(topics.PICTURES, lambda picture, at: self.pictures.add(picture))
         self.control = transport.slot(topics.CONTROL)
@@ -176,11 +174,9 @@ class RobotLink:
     def map_frame(self) -> MapFrame:
         """Where odom is in map."""
         told = self._localisation.peek()
-        if told is not None and told.message is not self._located[0]:
-            # A transform that is none changes nothing.
-            with suppress(ModelError):
-                self._located = told.message, MapFrame.told(told.message)
-        return self._located[1]
+        if told is not None:
+            self._map_frame = self._map_frame.after(told.message)
+        return self._map_frame
 
     def posture(self, now: float) -> Posture | None:
         """The measured posture, or None before the first joints and odometry."""

@@ -1,4 +1,4 @@
-"""Map and odom: what is seen in the one is kept and told in the other; without drift both are one."""
+"""Frames are taken in odom, the plant is kept in map. Without drift the two are the same."""
 
 import numpy as np
 import pinocchio as pin
