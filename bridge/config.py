@@ -54,7 +54,7 @@ class BridgeConfig(Struct, frozen=True, forbid_unknown_fields=True):
         odometry: Delay and noise of the simulated base's odometry.
     """
 
-    start_arm: ArmPosture = (1.57, -1.2, 0.0, -2.6, 0.0, 1.9, 0.785)
+    start_arm: ArmPosture = (-0.2784, -0.1128, -0.0354, -2.0055, 1.6759, 1.2124, -0.269)
     max_age_s: Annotated[float, at_most(0.2)] = 0.2
     fade_s: Annotated[float, at_most(0.1)] = 0.07
     # The required 0.2 s: a larger value leaves no time for a late step.

@@ -108,8 +108,10 @@ def looked_at(url: str, cookie: str, pages: int, slow: int, whole: bool = False)
         assert crowd.stdout is not None
         if crowd.stdout.readline() != "open\n":
             raise RollingPandaError("the pages that look on were not let in")
-        yield
-        told, _ = crowd.communicate(timeout=20)
+        try:
+            yield
+        finally:
+            told, _ = crowd.communicate(timeout=20)
     if ended := json.loads(told):
         how = ", ".join(f"{count} x {reason}" for reason, count in Counter(ended).most_common())
         raise RollingPandaError(f"{len(ended)} of the pages and views that read were ended: {how}")

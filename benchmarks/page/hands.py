@@ -184,6 +184,10 @@ def press_stop(page: "Page", demo: Demo, count: int, seed: int) -> Stops:
     for _ in range(count):
         if demo.in_mode("ESTOP_LATCHED"):
             _reset(demo)
+        if demo.in_mode("PAUSED"):
+            # A hold that the server renewed too late ends so.
+            demo.post("resume")
+            demo.wait(lambda: demo.in_mode("READY"), 20.0)
         if not demo.in_mode("READY"):
             demo.post("arm")
             demo.wait(lambda: demo.in_mode("READY"), 20.0)

@@ -1,3 +1,4 @@
+from bridge.config import BridgeConfig
 from controller.config import ControllerConfig
 from rolling_panda.config import RobotConfig, load_section
 from rolling_panda.model.robot import ARM_Q, RobotModel
@@ -8,6 +9,10 @@ SIM = resource("assets/config/sim.toml")
 
 def test_the_simulations_configuration_agrees_with_the_defaults():
     assert load_section(SIM, "controller", ControllerConfig) == ControllerConfig()
+
+
+def test_the_simulation_starts_in_the_survey_posture_also_with_a_configuration_of_one_line():
+    assert BridgeConfig().start_arm == ControllerConfig().work.home
 
 
 def test_postures_are_inside_the_arms_limits():

@@ -229,6 +229,26 @@ def test_in_a_mode_without_teleoperation_every_button_says_why(page: Page, serve
     expect(page.locator("rp-joints")).to_be_hidden()
 
 
+def test_a_controller_that_is_silent_for_a_moment_ends_the_hold_and_not_the_teleoperation(
+    page: Page, server: PlayedServer
+) -> None:
+    begin(page, "Joints")
+    up = page.get_by_role("button", name="Joint 2 up")
+    up.hover()
+    page.mouse.down()
+    until(page, lambda: held(server))
+    heard_s, server.heard_s = server.heard_s, 1.4
+    until(page, lambda: not held(server))
+    expect(page.locator("#teleop")).to_have_attribute("aria-disabled", "true")
+    server.heard_s = heard_s
+    expect(page.locator("#teleop")).to_have_attribute("aria-disabled", "false")
+    expect(up).to_be_visible()
+    assert not held(server)
+    page.mouse.up()
+    page.mouse.down()
+    until(page, lambda: held(server))
+
+
 # --- arrows beside the gizmo -----------------------------------------------------------------------------------------
 
 

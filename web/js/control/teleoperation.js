@@ -144,9 +144,11 @@ export function initTeleoperation() {
     hold.releaseAll();
     showToast("warning", reasonText(reason));
   };
-  // After a mode without teleoperation the switch has to be pressed again.
+  // After a mode without teleoperation the switch has to be pressed again. A process that is silent for a moment ends the
+  // hold, and that is enough.
   pageState.subscribe(() => {
-    if (teleoperating.get() && whyNoTeleoperation()) setTeleoperating(false);
+    const why = teleoperating.get() ? whyNoTeleoperation() : null;
+    if (why && why.code !== "process_silent") setTeleoperating(false);
   });
   // No other screen shows what moves.
   screen.subscribe((name) => {
