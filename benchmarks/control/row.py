@@ -23,6 +23,7 @@ from benchmarks.control.cane_touches import Cane, CaneTouches
 from benchmarks.control.cut_truth import WantedCut, true_cut, wanted_cuts
 from benchmarks.control.row_report import Cut, RowRun, mean_stages, summarise, tell, tell_stages
 from benchmarks.control.row_stages import StageClock
+from benchmarks.control.row_supervisor import Supervisor
 from benchmarks.control.row_walk import walk
 from bridge.sim.robot import trace
 from bridge.sim.robot.robot import SimulatedRobot
@@ -46,6 +47,8 @@ from tests.support.worlds.closed_loop import ClosedLoop
 _OPEN: tuple[m.PointState, ...] = ("ACCEPTED", "UNREACHABLE", "CUTTING")
 _SURVEY_S = 6.0
 _LOOK_S, _LIMIT_S = 3.0, 120.0
+#: After the work, in which the last close-up is taken (s).
+_AFTER_S = 3.0
 #: Periods between two looks at what touches a cane.
 _LOOK_EVERY = 4
 
@@ -62,6 +65,7 @@ def cut_row(
     world: WorldConfig = CALM,
     checked: bool = False,
     localise: bool = False,
+    supervised: bool = False,
 ) -> RowRun:
     """Survey from the start posture, accept up to `points` of what was detected, work through them.
 
@@ -79,6 +83,7 @@ def cut_row(
         segmenter: In place of the configured one.
         checked: The camera is checked first, and a correction that is offered is used.
         localise: Perception corrects the odometry by the wood that it has seen.
+        supervised: A played person lets the work go on after a stop, at most a few times.
         world: Disturbances. Where `odom` drifts, `distance`, `tool_error` and `path_rms` are no truth.
     """
     errors: list[float] = []
@@ -99,20 +104,22 @@ def cut_row(
             touches, wanted = CaneTouches(staying_rods(row_of(loop))), wanted_cuts(row_of(loop))
             warned = _check_camera(loop) if checked else ""
             accepted = [] if along else _accept(loop, points)
-            begin, other_s = loop.now, 0.0
+            begin, other_s, person = loop.now, 0.0, Supervisor(path)
             if along:
                 loop.run(_SURVEY_S)
                 loop.command(intents.Arm(user="bench"))
                 clock.begin(loop.now)
                 work_s, other_s = walk(loop, along)
+                auto_s = work_s
                 accepted, durations = [entry for entry in loop.queue() if entry.accepted_position is not None], {}
             else:
                 loop.command(intents.Start(user="bench"))
                 clock.begin(begin)
-                durations = _work(loop, [entry.point_id for entry in accepted])
-                work_s = sum(durations.values()) if durations else loop.now - begin
+                durations = _work(loop, [entry.point_id for entry in accepted], person if supervised else None)
+                other_s, auto_s = person.waited_s, loop.now - begin - person.waited_s - _AFTER_S
+                work_s = sum(durations.values()) if durations else auto_s
             ends = {entry.point_id: entry for entry in loop.queue()}
-            stops = sum("PROTECTIVE_STOP" in text_of(event.reason) for event in loop.events)
+            stops = sum(stopped(event.reason) for event in loop.events)
         record = trace.read(path)
     cuts = judged_cuts(method, seed, accepted, ends, wanted, record.events, durations)
     return RowRun(
@@ -125,6 +132,8 @@ def cut_row(
         contacts=int(np.count_nonzero(record.rows["contacts"])),
         self_contacts=int(np.count_nonzero(record.rows["self_contacts"])),
         stops=stops,
+        cleared=person.cleared,
+        auto_s=auto_s,
         stages=clock.stages,
         limits=clock.limits,
         canes_touched=spared(touches, record.events),
@@ -180,6 +189,11 @@ def judged_cuts(
             )
         )
     return tuple(cuts)
+
+
+def stopped(reason: m.Reason) -> bool:
+    """Whether a line of the log tells of a protective stop."""
+    return reason.code == "robot_halted" and dict(reason.values)["after"] == "PROTECTIVE_STOP"
 
 
 def codes(reason: m.Reason | None) -> str:
@@ -252,21 +266,31 @@ def _accept(loop: ClosedLoop, points: int) -> list[m.QueueEntry]:
     return accepted[:points]
 
 
-def _work(loop: ClosedLoop, todo: list[str]) -> dict[str, float]:
-    """Run until every point has ended or the work stands still. Returns simulated seconds a point."""
+def _work(loop: ClosedLoop, todo: list[str], person: Supervisor | None) -> dict[str, float]:
+    """Run until every point has ended or the work stands still. Returns simulated seconds of work a point."""
     durations: dict[str, float] = {}
-    begin = loop.now
+    active, begin = "", loop.now
 
     def ended() -> set[str]:
         return set(todo) - set(durations) - {entry.point_id for entry in loop.queue(*_OPEN)}
 
-    while loop.run_until(lambda: bool(ended()) or loop.controller.mode != "AUTO", _LIMIT_S):
-        if not (now_ended := ended()):
-            break
-        for point_id in now_ended:
+    def something() -> bool:
+        nonlocal active
+        if loop.state is not None and loop.state.mode == "AUTO":
+            active = loop.state.active_point_id
+        return bool(ended()) or loop.controller.mode != "AUTO"
+
+    while loop.run_until(something, _LIMIT_S):
+        for point_id in (now_ended := ended()):
             durations[point_id] = loop.now - begin
             begin = loop.now
-    loop.run(3.0)
+        if now_ended:
+            continue
+        waited = 0.0 if person is None else person.waited_s
+        if person is None or not person.lets_go_on(loop, active):
+            break
+        begin += person.waited_s - waited
+    loop.run(_AFTER_S)
     return durations
 
 

@@ -65,13 +65,15 @@ class RowRun:
         path_rms: Of the true tool against its trajectory, over all followed motion (m).
         contacts: Physics steps in which the robot met posts, trunks, cordons or wires.
         self_contacts: Physics steps in which it met itself.
-        stops: Times it stopped by itself.
+        stops: Protective stops.
         stages: Seconds by stage (simulated).
         limits: Seconds under way between cuts by what held the motion back.
         canes_touched: Canes, not the ones cut, that a part of the robot other than the blades overlapped with, and
             which parts these were.
         staying_touched: The same of wood that stays when the row is pruned, on canes that were cut too.
         camera_warning: What a check of the camera has told; empty without a check, or where nothing is wrong.
+        cleared: Stops and pauses after which a played person let the work go on.
+        auto_s: In automatic work, whether a point ended or not (s, simulated).
     """
 
     method: str
@@ -88,6 +90,8 @@ class RowRun:
     canes_touched: dict[str, str]
     staying_touched: dict[str, str]
     camera_warning: str = ""
+    cleared: int = 0
+    auto_s: float = 0.0
 
 
 def tell(run: RowRun, speed: float) -> None:
@@ -162,4 +166,5 @@ def summarise(runs: list[RowRun]) -> dict[str, float | int]:
         "canes_touched": sum(len(run.canes_touched) for run in runs),
         "staying_touched": sum(len(run.staying_touched) for run in runs),
         "stops": sum(run.stops for run in runs),
+        "stops_cleared": sum(run.cleared for run in runs),
     }

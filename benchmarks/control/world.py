@@ -96,6 +96,36 @@ def summarise(runs: Sequence[RowRun]) -> dict[str, Figure]:
     }
 
 
+@dataclass(frozen=True)
+class Work:
+    """Automatic work over all rows of one world.
+
+    Attributes:
+        minutes: Of automatic work (simulated).
+        stops: Protective stops.
+        stops_cleared: Stops and pauses after which a played person let the work go on.
+    """
+
+    minutes: float
+    stops: int
+    stops_cleared: int
+
+
+def work_of(runs: Sequence[RowRun]) -> Work:
+    """How long the rows were worked on, and what stopped it."""
+    minutes = sum(run.auto_s for run in runs) / 60.0
+    return Work(minutes, sum(run.stops for run in runs), sum(run.cleared for run in runs))
+
+
+def told_stops(work: Work) -> str:
+    """Stops and their rate as text."""
+    each = f", one in {work.minutes / work.stops:.1f} min" if work.stops else ""
+    return (
+        f"protective stops {work.stops} in {work.minutes:.1f} min of work{each}; "
+        f"stops and pauses a person cleared {work.stops_cleared}"
+    )
+
+
 def told(figure: Figure) -> str:
     """A share as text, with its interval."""
     if figure.value is None or figure.low is None or figure.high is None:
@@ -117,6 +147,9 @@ def main(argv: Sequence[str]) -> int:
     parser.add_argument("--pictures", type=float, default=0.7, help="pictures a second in motion (default: 0.7)")
     parser.add_argument("--check-camera", action="store_true", help="check the camera first, and use the correction")
     parser.add_argument("--localise", action="store_true", help="with the place in the row estimated")
+    parser.add_argument(
+        "--supervised", action="store_true", help="with a played person who lets the work go on after a stop"
+    )
     parser.add_argument("--segmenter", default="", choices=SEGMENTERS, help="in place of the configured one")
     words = parser.parse_args(argv)
     if words.each and words.knob:
@@ -136,13 +169,15 @@ def main(argv: Sequence[str]) -> int:
                 world=case.world,
                 checked=words.check_camera,
                 localise=words.localise,
+                supervised=words.supervised,
             )
             runs.append(run)
             results += [{"disturbance": case.name, "level": case.level, **asdict(cut)} for cut in run.cuts]
             right, harmed = sum(cut.true_right for cut in run.cuts), sum(bool(cut.harm) for cut in run.cuts)
             print(
                 f"{case.name}, {case.level}, seed {seed}: {right} of {len(run.cuts)} right, {harmed} harmed, "
-                f"{run.contacts} contacts, {time.perf_counter() - begin:.0f} s",
+                f"{run.contacts} contacts, {run.stops} stops, {run.cleared} cleared, "
+                f"{time.perf_counter() - begin:.0f} s",
                 flush=True,
             )
             if run.camera_warning:
@@ -151,13 +186,15 @@ def main(argv: Sequence[str]) -> int:
                 if not cut.true_right:
                     past = "" if cut.past_best is None else f", {1000 * cut.past_best:+.0f} mm past the best place"
                     print(f"    {cut.point_id}: {cut.state} {cut.reason}{past} {cut.harm}", flush=True)
-        figures = summarise(runs)
+        figures, work = summarise(runs), work_of(runs)
         print(
             f"  right {told(figures['right'])}; of cuts made {told(figures['right_of_made'])}; "
-            f"void {told(figures['void'])}; harmed {told(figures['harmed'])}",
+            f"void {told(figures['void'])}; harmed {told(figures['harmed'])}\n"
+            f"  {told_stops(work)}",
             flush=True,
         )
-        summary[f"{case.name}, {case.level}"] = {name: asdict(figure) for name, figure in figures.items()}
+        shares = {name: asdict(figure) for name, figure in figures.items()}
+        summary[f"{case.name}, {case.level}"] = {**shares, **asdict(work)}
         # A run over many worlds takes hours: what is done is on disk.
         write(
             words.json,
@@ -166,6 +203,7 @@ def main(argv: Sequence[str]) -> int:
                 "segmenter": words.segmenter,
                 "camera_checked": words.check_camera,
                 "localise": words.localise,
+                "supervised": words.supervised,
                 "rows": words.count,
                 "first_seed": words.seed,
                 "summary": summary,

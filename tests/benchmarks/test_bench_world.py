@@ -1,6 +1,7 @@
 """The benchmark in a rough world: which worlds it runs, what it counts, what it refuses, and its picture."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -52,10 +53,17 @@ def test_shares_are_of_the_accepted_and_of_the_cuts_that_were_made() -> None:
     assert low is not None and high is not None and low < 3 / 7 < high
 
 
+def test_minutes_of_work_for_a_stop_are_told_beside_the_times_a_person_came() -> None:
+    work = bench.work_of([replace(run(cut()), stops=1, cleared=2, auto_s=90.0), replace(run(cut()), auto_s=210.0)])
+    assert work == bench.Work(minutes=5.0, stops=1, stops_cleared=2)
+    assert "1 in 5.0 min of work, one in 5.0 min" in bench.told_stops(work)
+    assert "one in" not in bench.told_stops(bench.work_of([run(cut())]))
+
+
 def test_what_was_run_is_on_disk_and_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     worlds: list[tuple[int, WorldConfig]] = []
 
-    def worked_off(seed, points, method, pictures, segmenter, world, checked, localise):
+    def worked_off(seed, points, method, pictures, segmenter, world, checked, localise, supervised):
         worlds.append((seed, world))
         return run() if world.depth_lost == PRESETS["storm"].depth_lost else run(cut(), cut(right=world == CALM))
 
