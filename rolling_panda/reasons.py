@@ -1981,6 +1981,11 @@ def which_cane_unclear(distance_mm: float) -> None:
 
 
 @_reason("info", "")
+def which_internode_unclear() -> None:
+    """The picture is shifted along the canes, and the nodes of this one do not tell which internode is which."""
+
+
+@_reason("info", "")
 def node_unseen_in_shifted_picture(distance_mm: float) -> None:
     """The picture is shifted by {distance_mm:.0f} mm, and the bud before the cut was not seen."""
 
@@ -2712,6 +2717,11 @@ def touched(part: str, other: str, force_n: float) -> None:
 @_reason("error", "look what it was before you go on")
 def touched_unknown(part: str, force_n: float) -> None:
     """Contact with about {force_n:.0f} N: {part}, and something that the robot does not know."""
+
+
+@_reason("warning", "look whether the cane can be bent aside, or cut this one by hand")
+def cane_in_way(part: str, other: str, force_n: float) -> None:
+    """A cane in the way, about {force_n:.0f} N: {part}, and probably {other}; the robot gave way to it."""
 
 
 @_reason("info", "")

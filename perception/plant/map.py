@@ -121,11 +121,14 @@ class KnownCane:
         return replace(cane, radius=float(np.median(self.radii)), observations=len(self.radii), number=self.number)
 
     def as_cane(self) -> Cane:
-        """The best observation with the radius and the confirmed nodes of all, up to a cut."""
+        """The best observation with the radius and the confirmed nodes of all, up to a cut.
+
+        Nodes beyond what it shows of the cane have no place.
+        """
         nodes = tuple(
             Node(node.arc, node.pixels)
             for node in self.nodes
-            if node.estimate.count >= _MIN_SHARE * self.base.count and node.arc < self.cut_at
+            if node.estimate.count >= _MIN_SHARE * self.base.count and node.arc < min(self.cut_at, self.best.length)
         )
         stands = self.best.arc <= self.cut_at
         if np.count_nonzero(stands) < 2:

@@ -112,8 +112,8 @@ def check_close_up(
     labels = segmenter.segment(part)
     lines = trace_canes(part, labels, config.skeleton)
     shift = picture_shift(known, lines, position, along)
-    moved = lift + (0.0 if shift is None else float(np.linalg.norm(shift)))
-    position = position if shift is None else position + shift
+    moved = lift + (0.0 if shift is None else float(np.linalg.norm(shift.by)))
+    position = position if shift is None else position + shift.by
     beyond = wood_presence(part, labels, position + limits.probe_distance * along)[0]
     cane = _cane_at(position, along, lines, limits)
     if cane is None:
@@ -131,6 +131,8 @@ def check_close_up(
         return result("unseen", reasons.beyond_cut_hidden(), cane)
     if shift is None and cane.distance > limits.sure_offset:
         return result("unseen", reasons.which_cane_unclear(1e3 * cane.distance), cane)
+    if shift is not None and not shift.agreed:
+        return result("unseen", reasons.which_internode_unclear(), cane)
     if beyond == "gone":
         return result("unseen", reasons.cane_end_unclear(), cane)
     if point.offset is None:

@@ -3,7 +3,13 @@
 An error of the hand-eye calibration, of the odometry or of the joints shifts all wood in a picture alike. The shift is
 the one under which the canes and nodes that are known around a point coincide with those that the picture shows. It
 tells the point's own cane from its neighbours, however far the picture is shifted.
+
+Along the cane only nodes tell. Not all of them are seen, and some that are seen are none. So a shift along is believed
+where it explains clearly more of the nodes than no shift does. Where those of the point's own cane contradict it,
+nobody knows which internode is which.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -24,8 +30,15 @@ _AGREED, _CLEARLY = 0.4, 0.25
 _SPACING = 0.002
 
 
-def picture_shift(known: Surroundings, lines: list[Centreline], position: Array, along: Array) -> Array | None:
-    """Shift (3, m, odom) of a picture: where a point is seen, less where it is in the map.
+class PictureShift(NamedTuple):
+    """Where a point is seen, less where it is in the map (3, m, odom), and whether the nodes agree along the cane."""
+
+    by: Array
+    agreed: bool = True
+
+
+def picture_shift(known: Surroundings, lines: list[Centreline], position: Array, along: Array) -> PictureShift | None:
+    """How far a picture is shifted.
 
     Args:
         known: Canes and nodes around the point; without any, the shift is zero.
@@ -37,7 +50,7 @@ def picture_shift(known: Surroundings, lines: list[Centreline], position: Array,
         The smallest shift that explains the known wood well; None where no shift explains it.
     """
     if not known.axes:
-        return np.zeros(3)
+        return PictureShift(np.zeros(3))
     if not lines:
         return None
     samples = [interpolate(np.arange(0.0, float(line.arc[-1]), _SPACING), line.arc, line.axis) for line in lines]
@@ -49,7 +62,11 @@ def picture_shift(known: Surroundings, lines: list[Centreline], position: Array,
         return None
     good = [shift for shift, share in zip(shifts, shares, strict=True) if share >= shares.max() - _BETTER]
     across = min(good, key=lambda shift: float(np.linalg.norm(shift)))
-    return across + _along(known.nodes + across, _nodes(lines), along) * along
+    found, nodes = known.nodes + across, _nodes(lines)
+    further = _along(found, nodes, along)
+    own = found[np.linalg.norm(_aside(found - position - across, along), axis=1) < _THERE]
+    agreed = _explained(own, nodes, along, further) >= _explained(own, nodes, along, 0.0)
+    return PictureShift(across + further * along, agreed)
 
 
 def _across(axis: Array, line: Array, position: Array) -> Array | None:
@@ -72,20 +89,31 @@ def _along(known: Array, seen: Array, along: Array) -> float:
     Where there are many nodes, or some are not seen, a shift by an internode explains some of them by chance. So it has
     to explain clearly more of them than no shift does.
     """
-    if not len(known) or not len(seen):
-        return 0.0
     apart = seen[None] - known[:, None]
     steps = apart @ along
-    beside = np.linalg.norm(apart - steps[..., None] * along, axis=2) < _THERE
+    beside = np.linalg.norm(_aside(apart, along), axis=2) < _THERE
+    shifts = steps[beside & (np.abs(steps) <= _REACH)].tolist()
 
     def explained(shift: float) -> int:
-        return int((beside & (np.abs(steps - shift) < _THERE)).any(axis=1).sum())
+        return _explained(known, seen, along, shift)
 
-    shifts = steps[beside & (np.abs(steps) <= _REACH)].tolist()
     best = max(shifts, key=lambda shift: (explained(shift), -abs(shift)), default=0.0)
     more = explained(best) - explained(0.0)
     agreed = explained(best) >= 2 and explained(best) >= _AGREED * len(known)
     return float(best) if agreed and more > max(1.0, _CLEARLY * len(known)) else 0.0
+
+
+def _explained(known: Array, seen: Array, along: Array, shift: float) -> int:
+    """How many known nodes a shift along (m) brings to one that is seen; one that is seen explains one."""
+    apart = seen[None] - known[:, None] - shift * along
+    there = (np.linalg.norm(_aside(apart, along), axis=2) < _THERE) & (np.abs(apart @ along) < _THERE)
+    return int(min(there.any(axis=1).sum(), there.any(axis=0).sum()))
+
+
+def _aside(vectors: Array, along: Array) -> Array:
+    """The part of vectors (…×3) across the cane."""
+    out: Array = vectors - (vectors @ along)[..., None] * along
+    return out
 
 
 def _nodes(lines: list[Centreline]) -> Array:

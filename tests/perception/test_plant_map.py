@@ -58,6 +58,12 @@ def test_a_node_that_one_look_in_three_invents_is_not_believed_and_one_that_it_m
     assert [round(node.arc, 3) for node in fused.nodes] == [0.02, 0.10, 0.18, 0.26]
 
 
+def test_nodes_beyond_what_the_clearest_look_shows_are_not_put_at_its_end():
+    clear, longer = cane(nodes=(0.02, 0.10), length=0.15), cane(hidden=(Span(0.3, 0.4),))
+    around = known(plant(clear), plant(longer), plant(longer)).around(np.array([0.0, 0.0, 1.1]), 0.2)
+    assert sorted(around.nodes[:, 2]) == pytest.approx([0.97, 1.05])
+
+
 def test_a_cane_that_one_look_in_three_invents_is_not_believed():
     looks = [plant(cane()), plant(cane(), cane(x=0.04)), plant(cane())]
     (spur,) = known(*looks).spurs
