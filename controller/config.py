@@ -246,6 +246,9 @@ class ContactConfig(Struct, frozen=True, forbid_unknown_fields=True):
         stop_force: Force at the tool that stops the robot (N).
         stop_torque: External torque of one of the joints 1 to 4 that stops the robot (N·m).
         stop_torque_wrist: The same of the joints 5 to 7.
+        cane_force: Force at the tool up to which a known cane is given way to in automatic work (N).
+        cane_torque: The same for the joints 1 to 4 (N·m).
+        cane_torque_wrist: The same for the joints 5 to 7 (N·m).
         back_off: Distance that the tool goes back on its way after a contact (m).
     """
 
@@ -253,6 +256,9 @@ class ContactConfig(Struct, frozen=True, forbid_unknown_fields=True):
     stop_force: Annotated[float, at_most(30.0)] = 20.0
     stop_torque: Annotated[float, at_most(20.0)] = 10.0
     stop_torque_wrist: Annotated[float, at_most(10.0)] = 5.0
+    cane_force: Annotated[float, at_most(40.0)] = 28.0
+    cane_torque: Annotated[float, at_most(30.0)] = 18.0
+    cane_torque_wrist: Annotated[float, at_most(15.0)] = 9.0
     back_off: Annotated[float, within(0.0, 0.2, or_zero=True)] = 0.05
 
 

@@ -116,6 +116,8 @@ _ALL: Final = (
     Limit("controller.contact.light_force", 8.0, unit="N"),
     Limit("controller.contact.stop_force", 20.0, unit="N"),
     Limit("controller.contact.stop_torque", 10.0, unit="N·m"),
+    Limit("controller.contact.cane_force", 28.0, unit="N"),
+    Limit("controller.contact.cane_torque", 18.0, unit="N·m"),
     Limit("real.arm.contact_force", 30.0, unit="N"),
     Limit("real.arm.contact_torque", 20.0, unit="N·m"),
     Limit("controller.work.cut_timeout_s", 3.0),
@@ -297,6 +299,28 @@ RELATIONS: Final = (
         "controller.contact.stop_torque",
         "real.arm.contact_torque",
         "the robot stops and goes back before the arm's control box stops it for good",
+        strict=True,
+    ),
+    Relation(
+        "controller.contact.stop_force",
+        "controller.contact.cane_force",
+        "a known cane may push as hard as anything else before a person is asked for",
+    ),
+    Relation(
+        "controller.contact.stop_torque",
+        "controller.contact.cane_torque",
+        "a known cane may push as hard as anything else before a person is asked for",
+    ),
+    Relation(
+        "controller.contact.cane_force",
+        "real.arm.contact_force",
+        "the robot gives way to a cane before the arm's control box stops it for good",
+        strict=True,
+    ),
+    Relation(
+        "controller.contact.cane_torque",
+        "real.arm.contact_torque",
+        "the robot gives way to a cane before the arm's control box stops it for good",
         strict=True,
     ),
     Relation(

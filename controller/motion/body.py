@@ -2,16 +2,18 @@
 
 import math
 from collections import deque
+from itertools import pairwise
 
 import numpy as np
 
 from controller.config import ControllerConfig
 from controller.identity import Token
-from controller.motion.contact import ContactMonitor
+from controller.motion.contact import CANE, ContactMonitor
 from controller.motion.follower import Follower, Measured
 from controller.motion.surroundings import Surroundings
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.compiled import COUNT, NOTHING, NUMBER, VECTOR, compiled
+from controller.whole_body.obstacle import Obstacle
 from controller.whole_body.registry import make_method
 from controller.whole_body.saturation import Saturation
 from controller.whole_body.task import Method
@@ -19,12 +21,12 @@ from controller.whole_body.two_rates import TwoRates
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.config import RobotConfig
-from rolling_panda.messages.perception import Localisation, Obstacles
+from rolling_panda.messages.perception import Localisation, Obstacles, PruningPoints
 from rolling_panda.messages.robot import JointState, Odometry
 from rolling_panda.model.differential_drive import NXI, Array, DifferentialDrive, Pose
 from rolling_panda.model.map_frame import MapFrame
 from rolling_panda.model.robot import RobotModel
-from rolling_panda.model.wire_values import actuated
+from rolling_panda.model.wire_values import actuated, vector3
 from rolling_panda.transport.inbox import Inbox, Received
 
 #: Longest extrapolation of odometry (s); older odometry is a fault.
@@ -177,10 +179,21 @@ class Body:
             self._method.start_period(sent, self.setpoints.before, wheels)
             around = self.surroundings.model.obstacles
             moves = not self.setpoints.at_rest
-            self.contact.update(joints.message, q, self.measured.kinematics, moves, around)
+            self.contact.update(
+                joints.message, q, self.measured.kinematics, moves, around, lambda: self._known_canes(inbox)
+            )
             if moves:
                 self.trail.append((q[3:], self.measured.kinematics.T_odom_tool.translation))
         self.surroundings.update(self.obstacles)
+
+    def _known_canes(self, inbox: Inbox) -> list[Obstacle]:
+        """All standing canes that perception knows, in odom."""
+        points = inbox.newest(PruningPoints)
+        if points is None:
+            return []
+        place = self.frame.position_in_odom
+        lines = [[vector3(place(np.array(each))) for each in line] for line in points.message.canes]
+        return [Obstacle(CANE, CANE, start, end, _CANE_RADIUS) for line in lines for start, end in pairwise(line)]
 
     def _locate(self, inbox: Inbox) -> None:
         """Take in where odom is in map, and the obstacles in odom."""
@@ -194,6 +207,9 @@ class Body:
                 in_odom = Obstacles(header=m.Header(around.message.header.stamp, "odom"), capsules=capsules)
                 self.obstacles = Received(in_odom, around.at)
 
+
+#: Radius of a known cane of which only the course is told (m).
+_CANE_RADIUS = 0.005
 
 #: Largest tracking error of wheels and joints (rad). In motion at full speed the servos'
 #: lag and the wire's take up 0.1 rad of a joint and 0.3 rad of a wheel.

@@ -3,11 +3,12 @@
 The arm's estimate of external torques has offsets. It also contains the torques of the base's acceleration and tilt.
 The monitor subtracts the torque of the base's acceleration and a slow average. It compares the rest with limits in
 every period: the force at the tool that explains it, and the torque of each joint. When a limit is passed, it looks for
-the spot of the robot at which one force explains all torques, and for the known obstacle there.
+the spot of the robot at which one force explains all torques, and for the known obstacle there. In work among canes a
+push of a known cane is kept apart from a contact, up to limits of its own: the robot gives way to it.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -42,6 +43,8 @@ _SD = np.array([0.5, 0.5, 0.5, 0.5, 0.2, 0.2, 0.2])
 _UNSURE = 0.15
 #: An obstacle farther than this from the spot was not touched (m): the camera errs, and capsules are larger than links.
 _BESIDE = 0.05
+#: Names of canes among the obstacles begin so.
+CANE = "cane"
 #: Least cosine between the force and the direction from obstacle to robot.
 _TOWARDS = 0.3
 
@@ -85,6 +88,7 @@ class ContactMonitor:
         # Kinematics of others are in the robot's own data.
         self._data = robot.model.createData()
         self._limits = np.array([config.stop_torque] * 4 + [config.stop_torque_wrist] * 3)
+        self._cane_limits = np.array([config.cane_torque] * 4 + [config.cane_torque_wrist] * 3)
         self._spots = Spots(robot)
         self._average, self._stamp = np.zeros(7), -math.inf
         #: Of the base: velocity forward (m/s) and yaw rate (rad/s), and the rates of both.
@@ -97,16 +101,28 @@ class ContactMonitor:
         self.lost = False
         #: The contact beyond a limit, until it is cleared; None without one.
         self.touch: Touch | None = None
+        #: Whether the robot is at work where it gives way to a known cane.
+        self.gives_way = False
+        #: The push of a known cane that it gives way to, until that is done; None without one.
+        self.push: Touch | None = None
 
     @property
     def beyond(self) -> bool:
         """Whether a limit is passed now."""
-        return self.force is not None and (
-            self.force >= self._config.stop_force or bool((np.abs(self.torque) >= self._limits).any())
-        )
+        return self._passes(self._config.stop_force, self._limits)
+
+    def _passes(self, force: float, torques: Array) -> bool:
+        """Whether the force at the tool (N) or the torque of a joint (7, N·m) is beyond these limits now."""
+        return self.force is not None and (self.force >= force or bool((np.abs(self.torque) >= torques).any()))
 
     def update(
-        self, joints: m.JointState, q: Array, kinematics: Kinematics, moves: bool, obstacles: Sequence[Obstacle]
+        self,
+        joints: m.JointState,
+        q: Array,
+        kinematics: Kinematics,
+        moves: bool,
+        obstacles: Sequence[Obstacle],
+        canes: Callable[[], Sequence[Obstacle]] = tuple,
     ) -> None:
         """Take in a joint state; the same one again changes nothing.
 
@@ -116,6 +132,7 @@ class ContactMonitor:
             kinematics: At q.
             moves: Whether the robot is commanded to move: at rest it is being touched, but touches nothing.
             obstacles: What is known around.
+            canes: Gives all known canes, those included that are no obstacles.
         """
         passed = joints.header.stamp - self._stamp
         if passed == 0.0:
@@ -133,14 +150,30 @@ class ContactMonitor:
         force = _felt(raw, self._average, kinematics.J[:3, ARM_Q], self.torque)
         self.force = force
         if self.touch is None and moves and self.beyond:
-            self.touch = self._spots.touched(q, self.torque, obstacles)
-        if self.touch is None:
+            self._judge(q, obstacles, canes)
+        if self.touch is None and self.push is None:
             lasts = _RESTING_S if rests else _MOVING_S if force < self._config.light_force else _PUSHED_S
             _follow(self._average, raw, passed / lasts)
+
+    def _judge(self, q: Array, obstacles: Sequence[Obstacle], canes: Callable[[], Sequence[Obstacle]]) -> None:
+        """Tell a contact from the push of a known cane at q (12)."""
+        hard = self._passes(self._config.cane_force, self._cane_limits)
+        if self.push is not None and not hard:
+            return
+        known = tuple(canes()) if self.gives_way else ()
+        touch = self._spots.touched(q, self.torque, (*obstacles, *known))
+        if self.gives_way and not hard and touch.obstacle.startswith(CANE):
+            self.push = touch
+        else:
+            self.touch = touch
 
     def clear(self) -> None:
         """Forget the contact. At rest the robot feels itself anew: what still presses then counts as none."""
         self.touch = None
+
+    def gave_way(self, free: bool) -> None:
+        """The robot has given way to a push; where it is not free of it, that is a contact."""
+        self.push, self.touch = None, self.touch if free else self.push
 
     def _by_base(self, joints: m.JointState, q: Array, passed: float, begins: bool) -> Array:
         """Torques (7, N·m) that moved the arm along with the base, of which the arm's estimate knows nothing."""

@@ -10,6 +10,8 @@ from controller.motion.follower import Follower, Measured, Tracking
 from controller.motion.tool_motion import quintic
 from rolling_panda.model.differential_drive import Array
 
+#: Positions of ξ (9, rad) and of the tool (3, m), a control period apart.
+Trail = Sequence[tuple[Array, Array]]
 #: Times the duration of the way there, and least duration (s).
 _SLOWER, _SHORTEST_S = 2.0, 1.0
 #: Within this time the contact has to end (s).
@@ -21,12 +23,12 @@ _LATE_S = 1.0
 class BackOff:
     """One motion back. Call `step` until `done`; begin at rest."""
 
-    def __init__(self, config: MotionConfig, trail: Sequence[tuple[Array, Array]], distance: float, dt: float) -> None:
+    def __init__(self, config: MotionConfig, trail: Trail, distance: float, dt: float) -> None:
         """Plan.
 
         Args:
             config: Section `[controller.motion]`.
-            trail: Positions of ξ (9, rad) and of the tool (3, m) on the way here, a control period apart.
+            trail: The way here.
             distance: That the tool goes back, if the trail is long enough (m).
             dt: Control period (s).
         """

@@ -19,9 +19,11 @@ import numpy as np
 import pinocchio as pin
 
 from controller.config import ControllerConfig, WorkConfig
+from controller.motion.contact import ContactMonitor
 from controller.motion.follower import Follower, Measured, MotionTimeout, Tracking, missed
 from controller.motion.tool_motion import Leg, ToolMotion
 from controller.whole_body.saturation import Saturation
+from controller.work.back_off import BackOff, Trail
 from controller.work.base_views import BaseViews
 from controller.work.camera_views import CameraViews, Refusal
 from controller.work.close_up import CloseUpClient, PostCutCheck, camera_ready, not_as_accepted
@@ -195,6 +197,7 @@ class Parts:
         ending: Reason to begin no further cut; None without one.
         cut_point: Point of the last cut; empty before the first.
         cut_at: Position of the tool at the last cut (3, m, odom).
+        gave_way: Times that it gave way to canes since the last cut.
     """
 
     config: ControllerConfig
@@ -210,6 +213,7 @@ class Parts:
     ending: m.Reason | None = None
     cut_point: str = ""
     cut_at: Array = field(default_factory=lambda: np.zeros(3))
+    gave_way: int = 0
 
     def look_back(self, robot: Measured, now: float) -> None:
         """Request the close-up of the last cut once the tool is far enough from it.
@@ -219,10 +223,10 @@ class Parts:
         if math.dist(robot.kinematics.T_odom_tool.translation, self.cut_at) > self.config.work.close_up_from:
             self.post_cut_check.request_close_up(self.cut_point, now)
 
-    def refine(self, point_id: str, motion: ToolMotion, frame: MapFrame, known: m.Vector3 | None = None) -> None:
-        """Correct a motion to the newest, more accurate position of its point, unless that is the `known` one."""
+    def refine(self, point_id: str, motion: ToolMotion, frame: MapFrame) -> None:
+        """Correct a motion to the newest, more accurate position of its point."""
         ticket = self.queue.get(point_id)
-        if ticket is None or ticket.point.position == known:
+        if ticket is None:
             return
         _shift(motion, frame.position_in_odom(np.array(ticket.point.position)))
 
@@ -304,6 +308,8 @@ class Stage(ABC):
     phase: m.Phase = ""
     #: Whether the tool hides the point from the camera.
     in_canes = False
+    #: Whether the robot gives way to a known cane that pushes.
+    yields = False
     #: Point of the stage; empty without one.
     point_id = ""
 
@@ -364,6 +370,10 @@ class Stage(ABC):
 Step = tuple[Stage, StepResult]
 
 
+#: Rest between a push and the way back (s), in which the arm stops to swing.
+_REST_S = 0.2
+#: After so many pushes without a cut between them a person has to look.
+_PUSHES = 3
 #: Longest wait for a plan at the end of the work (s).
 _PLAN_WAIT_S = 15.0
 
@@ -422,6 +432,7 @@ class Escaping(Stage):
     """Moving the tool clear of the canes."""
 
     phase: m.Phase = "RETREAT"
+    yields = True
 
     def __init__(self, parts: Parts, way: FollowedMotion) -> None:
         """Along `way`."""
@@ -468,8 +479,53 @@ class Search(Stage):
         return Travel(parts, task, way), result
 
 
+class GivingWay(Stage):
+    """Back on the way that it came, since a known cane pushes; then clear of the canes."""
+
+    phase: m.Phase = "RETREAT"
+    in_canes = True
+    yields = True
+
+    def __init__(self, parts: Parts, point_id: str, contact: ContactMonitor, trail: Trail) -> None:
+        """From a push on the way to a cut or away from one.
+
+        Args:
+            parts: Of the sequence.
+            point_id: Point of the stage that the push has ended.
+            contact: What the arm feels.
+            trail: The way here.
+        """
+        super().__init__(parts)
+        self.point_id, self._contact, self._trail = point_id, contact, trail
+        self._rested = 0
+        self._back: BackOff | None = None
+
+    def step(self, robot: Measured, now: float) -> Step:
+        """One period."""
+        parts, config = self._parts, self._parts.config
+        dt = 1.0 / config.rate_hz
+        parts.look_back(robot, now)
+        if self._back is None:
+            self._rested = 0 if np.any(robot.sent) else self._rested + 1
+            if self._rested * dt >= _REST_S:
+                self._back = BackOff(config.motion, self._trail, config.contact.back_off, dt)
+            return self, parts.brake(robot)
+        if not self._back.done:
+            tracking = self._back.step(robot, parts.follower, self._contact)
+            return self, StepResult(tracking.xi, tracking)
+        free = self._back.arrived and not self._contact.beyond
+        self._contact.gave_way(free)
+        ticket = parts.queue.get(self.point_id)
+        if ticket is not None and ticket.state == "UNKNOWN":
+            why = reasons.outcome_unknown(self.point_id, ticket.reason or reasons.cutter_unsure())
+            return self, parts.brake(robot, why)
+        return Escape(parts), parts.brake(robot)
+
+
 class TaskStage(Stage):
     """A stage of a cut under way."""
+
+    yields = True
 
     def __init__(self, parts: Parts, task: CutTask, motion: Holds | None = None) -> None:
         """For one cut."""
@@ -580,26 +636,18 @@ class CloseUp(MovingStage):
         moved = 0.0 if known is None else math.dist(position, known)
         if moved > TOLD_MOVED:
             result = result.with_event(reasons.cut_where_seen(self.point_id, 1e3 * moved))
-        return Advance(parts, self._task, self._way, None if ticket is None else ticket.point.position), result
+        return Advance(parts, self._task, self._way), result
 
 
 class Advance(MovingStage):
-    """Straight into the canes."""
+    """Straight into the canes.
+
+    Where a close-up has told the place, the way ends there. From now on the tool hides it from the camera, and where
+    odom is in map may be told otherwise meanwhile.
+    """
 
     phase: m.Phase = "ADVANCE"
     in_canes = True
-
-    def __init__(self, parts: Parts, task: CutTask, way: FollowedMotion, close_up_of: m.Vector3 | None = None) -> None:
-        """For one cut, along `way`.
-
-        Args:
-            parts: Of the sequence.
-            task: The cut.
-            way: The motion.
-            close_up_of: Perception's position at the time of the close-up, which is more accurate; None without one.
-        """
-        super().__init__(parts, task, way)
-        self._close_up_of = close_up_of
 
     def step(self, robot: Measured, now: float) -> Step:
         """One period."""
@@ -608,7 +656,8 @@ class Advance(MovingStage):
         if left or parts.ending:
             stage, result = self._retreat(robot).step(robot, now)
             return stage, result.with_event(left) if left else result
-        parts.refine(self.point_id, motion, robot.frame, self._close_up_of)
+        if not config.work.pre_cut_check:
+            parts.refine(self.point_id, motion, robot.frame)
         tracking = self._way.track(robot)
         result = StepResult(tracking.xi, tracking)
         there = timeout.over(tracking, now, config.work.position_tolerance, config.work.rotation_tolerance)
@@ -620,6 +669,7 @@ class Advance(MovingStage):
             rests = False
         if rests:
             parts.blades.start(self.point_id, now)
+            parts.gave_way = 0
             return Cutting(parts, self._task, self._way), result
         if timeout.late(now):
             reason = missed("the cut", tracking)
@@ -633,6 +683,8 @@ class Cutting(MovingStage):
 
     phase: m.Phase = "CUT"
     in_canes = True
+    # Blades that close are not pulled away from what they hold.
+    yields = False
 
     def step(self, robot: Measured, now: float) -> Step:
         """One period."""
@@ -888,6 +940,35 @@ class CutSequence:
     def picture(self, now: float) -> tuple[int, str] | None:
         """Number and point of the picture to ask for in this period; None when none is due."""
         return self._parts.close_ups.due(now)
+
+    @property
+    def giving_way(self) -> bool:
+        """Whether the robot goes back from a cane."""
+        return isinstance(self._stage, GivingWay)
+
+    @property
+    def may_give_way(self) -> bool:
+        """Whether the robot would give way to a known cane that pushes now."""
+        return self._stage.yields and (self.giving_way or self._parts.gave_way < _PUSHES)
+
+    def give_way(self, contact: ContactMonitor, trail: Trail) -> m.Reason:
+        """Go back from the cane that pushes, and leave the cut that it is in the way of; returns what is logged.
+
+        Args:
+            contact: What the arm feels, with the push.
+            trail: The way here.
+        """
+        parts, stage, push = self._parts, self._stage, contact.push
+        assert push is not None
+        parts.gave_way += 1
+        parts.next_cut.forget()
+        told = why = reasons.cane_in_way(push.part, push.obstacle, float(np.linalg.norm(push.force)))
+        if isinstance(stage, Travel | CloseUp | Advance):
+            parts.close_ups.forget(stage.point_id)
+            parts.queue.resolve(stage.point_id, "FAILED_NOT_CUT", why)
+            told = reasons.point_not_cut(stage.point_id, why)
+        self._stage = GivingWay(parts, stage.point_id, contact, tuple(trail))
+        return told
 
     def hold(self) -> None:
         """Stand for one period in place of `step`. A close-up or a cut that was asked for goes on."""

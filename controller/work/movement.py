@@ -160,6 +160,8 @@ class Movement:
     def leave(self, mode: m.Mode) -> None:
         """End the motion source of a mode that has ended."""
         self.stay()
+        self.body.contact.gives_way = False
+        self.body.contact.gave_way(free=True)
         if mode == "AUTO":
             self.sequence.abort()
         self.teleoperation.refuse()
@@ -228,7 +230,11 @@ class Movement:
         return self._setpoints.command(xi, token, joints.message.sequence)
 
     def _work(self, robot: Measured, now: float) -> MotionResult:
+        contact = self.body.contact
+        if contact.push is not None and not self.sequence.giving_way:
+            self._event_log.log(self.sequence.give_way(contact, self.body.trail))
         work = self.sequence.step(robot, now)
+        contact.gives_way = self.sequence.may_give_way
         self.tracking = work.tracking
         for event in work.events:
             self._event_log.log(event)

@@ -9,10 +9,11 @@ from controller.motion.contact import ContactMonitor, Spots
 from controller.whole_body.obstacle import Obstacle
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
+from rolling_panda.messages.perception import Capsule
 from rolling_panda.messages.supervision import TeleopTarget
 from rolling_panda.model.robot import ARM_Q, RobotModel
 from rolling_panda.model.wire_values import arm_torques, vector3
-from tests.support.controller_at_work import robot, run_until, working
+from tests.support.controller_at_work import entry, robot, run_until, working
 from tests.support.points import point
 
 ROBOT = RobotModel()
@@ -28,7 +29,7 @@ class Arm:
         self.q, self.monitor, self.number = q, ContactMonitor(LIMITS, ROBOT), 0
         self.kinematics = ROBOT.kinematics(q)
 
-    def tell(self, torque, periods=1, moves=True, velocity=(0.0,) * 9, obstacles=()):
+    def tell(self, torque, periods=1, moves=True, velocity=(0.0,) * 9, obstacles=(), canes=()):
         for _ in range(periods):
             self.number += 1
             told = None if torque is None else arm_torques(np.asarray(torque, float))
@@ -39,7 +40,7 @@ class Arm:
                 velocity=velocity,
                 external_torque=told,
             )
-            self.monitor.update(joints, self.q, self.kinematics, moves, obstacles)
+            self.monitor.update(joints, self.q, self.kinematics, moves, obstacles, lambda: canes)
         return self.monitor
 
     def by(self, force):
@@ -185,6 +186,45 @@ def test_the_same_joint_state_twice_is_one():
     assert arm.tell(arm.by((0, -60, 0))).force == force
 
 
+# --- canes ------------------------------------------------------------------------------------------------------------
+
+
+def among_canes():
+    """An arm at work among canes, one of which is 30 mm before the blades, and a push of it by so many newtons."""
+    arm = Arm()
+    arm.tell(np.zeros(7), 50)
+    arm.monitor.gives_way = True
+    tool, ahead = arm.kinematics.T_odom_tool.translation, arm.kinematics.T_odom_tool.rotation[:, 2]
+    at = tool + 0.03 * ahead
+    cane = Obstacle("cane", "cane", tuple(at - [0.0, 0.0, 0.2]), tuple(at + [0.0, 0.0, 0.2]), 0.005)
+    return arm, cane, lambda newtons: arm.by(-newtons * ahead)
+
+
+def test_a_known_cane_that_pushes_is_no_contact_but_a_hard_push_of_it_is():
+    arm, cane, push = among_canes()
+    found = arm.tell(push(24.0), canes=(cane,))
+    assert found.beyond and found.touch is None and found.push is not None and found.push.obstacle == "cane"
+    found = arm.tell(push(45.0), canes=(cane,))
+    assert found.touch is not None, "what it gives way to now pushes too hard"
+
+
+@pytest.mark.parametrize("what", ["not at work", "unknown", "a wire"])
+def test_what_is_no_cane_that_is_known_or_pushes_a_robot_that_is_not_at_work_is_a_contact(what):
+    arm, cane, push = among_canes()
+    arm.monitor.gives_way = what != "not at work"
+    wire = Obstacle("wire 1", "wire", cane.start, cane.end, cane.radius)
+    around = {"not at work": (cane,), "unknown": (), "a wire": ()}[what]
+    found = arm.tell(push(24.0), obstacles=(wire,) if what == "a wire" else (), canes=around)
+    assert found.push is None and found.touch is not None
+
+
+def test_a_cane_that_still_pushes_after_the_robot_has_given_way_is_a_contact():
+    arm, cane, push = among_canes()
+    arm.tell(push(24.0), canes=(cane,))
+    arm.monitor.gave_way(free=False)
+    assert arm.monitor.push is None and arm.monitor.touch is not None and arm.monitor.touch.obstacle == "cane"
+
+
 # --- the robot's reaction ---------------------------------------------------------------------------------------------
 
 
@@ -279,6 +319,81 @@ def test_in_automatic_work_the_accepted_point_stays_accepted():
     assert r.state.mode == "PROTECTIVE_STOP" and r.state.interrupted == "work"
     assert [entry.state for entry in r.state.queue] == ["ACCEPTED"]
     assert r.state.tool_force is not None
+
+
+#: Points, and the canes that they are on.
+PLACES = {"a": 0.45, "b": 0.9, "c": 1.35, "d": 1.8}
+CANES = tuple(
+    Capsule("cane", (x, 0.75, 0.9), (x, 0.75, 1.09), 0.004, 0.004, 1, k) for k, x in enumerate(PLACES.values())
+)
+CUTS = tuple(point(name, (x, 0.75, 1.1), spur=k) for k, (name, x) in enumerate(PLACES.items()))
+
+
+class Pushed:
+    """A robot at work that a cane pushes back by a force (N), so many times, where it is on this stretch near a cut."""
+
+    def __init__(self, force, phase, count=2, lasts=0.3, most=1):
+        self.r = working(CUTS[:count], obstacles=CANES, external_torque=(0.0,) * 7)
+        self.force, self.phase, self.lasts, self.left, self.since = force, phase, lasts, most, None
+
+    def run(self, until, limit_s=60.0):
+        r = self.r
+        while not until(r.state):
+            tool = r.model.kinematics(r.q)
+            at = tool.T_odom_tool.translation
+            near = min(float(np.linalg.norm(at - cut.position)) for cut in CUTS) < 0.04
+            if self.since is None and near and self.left and r.state.mode == "AUTO" and r.state.phase == self.phase:
+                self.since, self.left = r.now, self.left - 1
+            if self.since is not None and r.now > self.since + self.lasts:
+                self.since = None
+            force = 0.0 if self.since is None else self.force
+            r.external_torque = arm_torques(tool.J[:3, ARM_Q].T @ np.array([0.0, -force, 0.0]))
+            r.step()
+            assert r.now < limit_s, (r.state.mode, r.state.phase, r.state.reason)
+        return r
+
+
+def done(state):
+    """All cuts have ended."""
+    return state is not None and state.mode == "READY" and any(e.state == "DONE" for e in state.queue)
+
+
+def ended(state):
+    return state is not None and state.mode in ("PAUSED", "PROTECTIVE_STOP", "FAULT")
+
+
+def test_to_a_cane_in_the_way_it_gives_way_says_so_and_makes_the_next_cut():
+    r = Pushed(28.0, "ADVANCE").run(done)
+    a = entry(r, "a")
+    assert a.state == "FAILED_NOT_CUT" and a.reason.code == "cane_in_way", a.reason
+    assert dict(a.reason.values)["other"].startswith("cane") and 20.0 < dict(a.reason.values)["force_n"] < 32.0
+    assert entry(r, "b").state == "DONE" and [cut[0] for cut in r.cuts] == ["b"]
+    assert not any("PROTECTIVE_STOP" in text for text in r.events)
+
+
+def test_a_cane_that_pushes_on_the_way_out_of_a_cut_ends_no_work():
+    r = Pushed(28.0, "RETREAT").run(done)
+    assert [cut[0] for cut in r.cuts] == ["a", "b"] and entry(r, "a").state == entry(r, "b").state == "DONE"
+    assert any("A cane in the way" in text for text in r.events)
+    assert not any("PROTECTIVE_STOP" in text for text in r.events)
+
+
+def test_a_hard_push_of_a_cane_stops_it_for_a_person():
+    r = Pushed(60.0, "ADVANCE").run(ended)
+    assert r.state.mode == "PROTECTIVE_STOP" and r.state.reason.code == "touched"
+    assert entry(r, "a").state == "ACCEPTED"
+
+
+def test_a_cane_that_goes_on_pushing_stops_it_for_a_person():
+    r = Pushed(28.0, "ADVANCE", lasts=30.0).run(ended)
+    assert r.state.mode == "PROTECTIVE_STOP" and r.state.reason.code == "touched"
+    assert entry(r, "b").state == "ACCEPTED"
+
+
+def test_canes_that_push_again_and_again_stop_it_for_a_person():
+    r = Pushed(28.0, "ADVANCE", count=4, most=4).run(ended)
+    assert r.state.mode == "PROTECTIVE_STOP"
+    assert [entry(r, name).state for name in PLACES] == [*["FAILED_NOT_CUT"] * 3, "ACCEPTED"]
 
 
 def test_an_estimate_that_ends_stops_the_robot_until_it_is_back():

@@ -99,3 +99,14 @@ def test_a_survey_keeps_its_line_along_the_row_and_comes_back_to_its_beginning()
     base = r.where.configuration_in_map(r.q)
     assert base[0] == pytest.approx(2.0, abs=0.03) and abs(r.q[0] - 2.0) > 0.05
     assert max(map(abs, aside)) < 0.03 and abs(base[2]) < 0.03
+
+
+def test_the_last_stretch_ends_where_the_close_up_saw_the_cane_whatever_is_told_of_the_map_since():
+    """The camera is blind there and the base at rest: a correction of the map is of wood that was seen elsewhere."""
+    r = working((point("a", CUT),), obstacles=(CANE,))
+    run_until(r, lambda s: s is not None and s.mode == "AUTO" and s.phase == "ADVANCE", 20.0)
+    r.hear(located(pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.026]))))
+    r.show((point("a", (CUT[0] + 0.004, CUT[1], CUT[2]), revision=2),))
+    run_until(r, lambda s: s.mode != "AUTO", 40.0)
+    assert entry(r, "a").state == "DONE", text_of(entry(r, "a").reason)
+    assert r.cuts[0][1][:3, 3] == pytest.approx(CUT, abs=0.002)

@@ -11,6 +11,7 @@ from rolling_panda.commands import COMMANDS
 from rolling_panda.model.robot import ARM_Q, ARM_XI, RobotModel
 from rolling_panda.reasons import text_of
 from tests.support.controller_at_work import CONFIG, entry, finish, robot, run_until, working
+from tests.support.controller_config import controller_config
 from tests.support.points import point
 from tests.support.sent import newest
 
@@ -230,7 +231,7 @@ def test_refusals_say_why_and_allowed_agrees_with_them():
 @pytest.mark.parametrize("phase", ["APPROACH", "ADVANCE"])
 def test_a_point_that_perception_refines_on_the_way_is_cut_where_it_is_now(phase):
     before = point("a", (0.5, 0.75, 1.0))
-    r = working((before,))
+    r = working((before,), config=controller_config(CONFIG, work__pre_cut_check=phase == "APPROACH"))
     run_until(r, lambda s: s.phase == phase and s.mode == "AUTO", 20.0)
     for _ in range(40):
         r.step()
