@@ -246,7 +246,7 @@ class ContactConfig(Struct, frozen=True, forbid_unknown_fields=True):
         stop_force: Force at the tool that stops the robot (N).
         stop_torque: External torque of one of the joints 1 to 4 that stops the robot (N·m).
         stop_torque_wrist: The same of the joints 5 to 7.
-        cane_force: Force at the tool up to which a known cane is given way to in automatic work (N).
+        cane_force: Force at the tool up to which a known cane is no contact in automatic work (N).
         cane_torque: The same for the joints 1 to 4 (N·m).
         cane_torque_wrist: The same for the joints 5 to 7 (N·m).
         back_off: Distance that the tool goes back on its way after a contact (m).

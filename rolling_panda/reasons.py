@@ -2721,7 +2721,12 @@ def touched_unknown(part: str, force_n: float) -> None:
 
 @_reason("warning", "look whether the cane can be bent aside, or cut this one by hand")
 def cane_in_way(part: str, other: str, force_n: float) -> None:
-    """A cane in the way, about {force_n:.0f} N: {part}, and probably {other}; the robot gave way to it."""
+    """A cane in the way, about {force_n:.0f} N: {part}, and probably {other}."""
+
+
+@_reason("info", "")
+def cane_on_way_out(why: Reason) -> None:
+    """A cane pushes on the way out of the canes, on which the robot goes on. {why}."""
 
 
 @_reason("info", "")

@@ -33,8 +33,11 @@ from rolling_panda.transport.inbox import Inbox, Received
 _LONGEST = 0.1
 #: Gain of the odometry correction, small so that odometry noise does not shake the tool.
 _BELIEVED = 0.2
-#: Control periods of motion that are remembered, to go back on: 3 s.
+#: Spots of the way that are remembered, to go back on: at full speed 3 s.
 _TRAIL = 300
+#: The next spot is remembered where the tool (m) or a joint or wheel (rad) has moved so far: who goes back from where
+#: the robot has pressed for seconds goes back at once.
+_TRAIL_TOOL, _TRAIL_JOINT = 0.0005, 0.002
 #: A larger difference from the odometry (m, rad) is no noise: the estimate is reset.
 _ELSEWHERE = 0.05
 
@@ -153,7 +156,7 @@ class Body:
         self._base = BaseEstimate(self.robot.drive)
         self.tracking_error = TrackingErrorMonitor()
         self.contact = ContactMonitor(config.contact, self.robot)
-        #: Way of the last seconds, oldest first: positions of ξ (9) and of the tool (3, m, odom).
+        #: The way here, oldest spot first: positions of ξ (9) and of the tool (3, m, odom).
         self.trail: deque[tuple[Array, Array]] = deque(maxlen=_TRAIL)
         self.measured: Measured | None = None
         #: Where odom is in map, as told last.
@@ -183,8 +186,16 @@ class Body:
                 joints.message, q, self.measured.kinematics, moves, around, lambda: self._known_canes(inbox)
             )
             if moves:
-                self.trail.append((q[3:], self.measured.kinematics.T_odom_tool.translation))
+                self._remember(q[3:], self.measured.kinematics.T_odom_tool.translation)
         self.surroundings.update(self.obstacles)
+
+    def _remember(self, position: Array, tool: Array) -> None:
+        """Add a spot of the way: positions of ξ (9, rad), and of the tool (3, m, odom)."""
+        if self.trail:
+            last, there = self.trail[-1]
+            if math.dist(tool, there) < _TRAIL_TOOL and float(np.abs(position - last).max()) < _TRAIL_JOINT:
+                return
+        self.trail.append((position, tool))
 
     def _known_canes(self, inbox: Inbox) -> list[Obstacle]:
         """All standing canes that perception knows, in odom."""

@@ -26,6 +26,8 @@ from rolling_panda.model.robot import ARM_Q, Kinematics, RobotModel
 
 #: Time constants of the average that is taken away (s): in motion, during a light push, and at rest.
 _MOVING_S, _PUSHED_S, _RESTING_S = 1.0, 10.0, 0.1
+#: In motion the average before a touch is out of date after this time (s).
+_UP_TO_DATE_S = 3.0
 #: Time constant of the arm's own filter (s), with which the base's acceleration is delayed alike.
 _FILTER_S = 0.01
 #: Acceleration of the base below which it moves the arm by no torque worth while (m/s², rad/s²).
@@ -91,6 +93,10 @@ class ContactMonitor:
         self._cane_limits = np.array([config.cane_torque] * 4 + [config.cane_torque_wrist] * 3)
         self._spots = Spots(robot)
         self._average, self._stamp = np.zeros(7), -math.inf
+        #: The average before the last touch, push or work among canes; whether what pressed at rest has been taken for
+        #: an offset since, and the time in motion after that (s).
+        self._before: Array | None = None
+        self._pressed, self._moved_s = False, 0.0
         #: Of the base: velocity forward (m/s) and yaw rate (rad/s), and the rates of both.
         self._speed = self._accelerated = (0.0, 0.0)
         #: Torques by touch (7, N·m).
@@ -101,8 +107,11 @@ class ContactMonitor:
         self.lost = False
         #: The contact beyond a limit, until it is cleared; None without one.
         self.touch: Touch | None = None
-        #: Whether the robot is at work where it gives way to a known cane.
+        #: Whether the robot is at work where the push of a known cane is no contact.
         self.gives_way = False
+        #: Whether the tool is among canes. The average stays as it was before them: a push that grows slowly, or that
+        #: lasts while the blades close, is a push.
+        self.among = False
         #: The push of a known cane that it gives way to, until that is done; None without one.
         self.push: Touch | None = None
 
@@ -148,24 +157,39 @@ class ContactMonitor:
         if begins:
             self._average[:] = raw
         force = _felt(raw, self._average, kinematics.J[:3, ARM_Q], self.torque)
+        if self._pressed and moves and force >= self._config.light_force and self._before is not None:
+            # What pressed at rest counted as none; once it is gone it is no push the other way.
+            unpressed = np.zeros(7)
+            released = _felt(raw, self._before, kinematics.J[:3, ARM_Q], unpressed)
+            if released < force:
+                force, self.torque, self._pressed = released, unpressed, False
+                self._average[:] = self._before
         self.force = force
         if self.touch is None and moves and self.beyond:
             self._judge(q, obstacles, canes)
-        if self.touch is None and self.push is None:
-            lasts = _RESTING_S if rests else _MOVING_S if force < self._config.light_force else _PUSHED_S
-            _follow(self._average, raw, passed / lasts)
+        if self.touch is not None or self.push is not None or self.among:
+            if not self._pressed:
+                self._before = self._average.copy()
+            return
+        if rests and force >= self._config.light_force:
+            self._pressed, self._moved_s = True, 0.0
+        elif moves:
+            self._moved_s += passed
+            self._pressed = self._pressed and self._moved_s < _UP_TO_DATE_S
+        lasts = _RESTING_S if rests else _MOVING_S if force < self._config.light_force else _PUSHED_S
+        _follow(self._average, raw, passed / lasts)
 
     def _judge(self, q: Array, obstacles: Sequence[Obstacle], canes: Callable[[], Sequence[Obstacle]]) -> None:
-        """Tell a contact from the push of a known cane at q (12)."""
+        """Tell a contact from the push of a known cane at q (12), of which the force counts, and not its lever."""
         hard = self._passes(self._config.cane_force, self._cane_limits)
         if self.push is not None and not hard:
             return
         known = tuple(canes()) if self.gives_way else ()
         touch = self._spots.touched(q, self.torque, (*obstacles, *known))
-        if self.gives_way and not hard and touch.obstacle.startswith(CANE):
-            self.push = touch
-        else:
+        if not self.gives_way or hard or not touch.obstacle.startswith(CANE):
             self.touch = touch
+        elif self.force is not None and self.force >= self._config.stop_force:
+            self.push = touch
 
     def clear(self) -> None:
         """Forget the contact. At rest the robot feels itself anew: what still presses then counts as none."""

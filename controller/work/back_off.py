@@ -5,14 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from controller.config import MotionConfig
-from controller.motion.contact import ContactMonitor
 from controller.motion.follower import Follower, Measured, Tracking
 from controller.motion.tool_motion import quintic
 from rolling_panda.model.differential_drive import Array
 
-#: Positions of ξ (9, rad) and of the tool (3, m), a control period apart.
+#: Positions of ξ (9, rad) and of the tool (3, m) along a way, a control period apart at most.
 Trail = Sequence[tuple[Array, Array]]
-#: Times the duration of the way there, and least duration (s).
+#: Times the duration of the way there without its stops, and least duration (s).
 _SLOWER, _SHORTEST_S = 2.0, 1.0
 #: Within this time the contact has to end (s).
 _FREE_S = 0.6
@@ -44,8 +43,8 @@ class BackOff:
         #: Whether it has ended, and whether it arrived.
         self.done, self.arrived = len(way) < 2, False
 
-    def step(self, robot: Measured, follower: Follower, contact: ContactMonitor) -> Tracking:
-        """One period."""
+    def step(self, robot: Measured, follower: Follower, beyond: bool) -> Tracking:
+        """One period; `beyond` says whether something is touched beyond what may be on this way."""
         progress = quintic(self._time, self._duration)
         last = len(self._way) - 1
         at = progress.s * last
@@ -57,6 +56,6 @@ class BackOff:
         self._passed += self._dt
         self.arrived = self._time >= self._duration
         # Something else is in the way back, or the robot is caught.
-        again = self._passed > _FREE_S and contact.beyond
+        again = self._passed > _FREE_S and beyond
         self.done = self.arrived or again or self._passed > self._duration + _LATE_S
         return tracking

@@ -19,7 +19,7 @@ import numpy as np
 import pinocchio as pin
 
 from controller.config import ControllerConfig, WorkConfig
-from controller.motion.contact import ContactMonitor
+from controller.motion.contact import ContactMonitor, Touch
 from controller.motion.follower import Follower, Measured, MotionTimeout, Tracking, missed
 from controller.motion.tool_motion import Leg, ToolMotion
 from controller.whole_body.saturation import Saturation
@@ -308,7 +308,7 @@ class Stage(ABC):
     phase: m.Phase = ""
     #: Whether the tool hides the point from the camera.
     in_canes = False
-    #: Whether the robot gives way to a known cane that pushes.
+    #: Whether the push of a known cane is no contact.
     yields = False
     #: Point of the stage; empty without one.
     point_id = ""
@@ -486,17 +486,16 @@ class GivingWay(Stage):
     in_canes = True
     yields = True
 
-    def __init__(self, parts: Parts, point_id: str, contact: ContactMonitor, trail: Trail) -> None:
-        """From a push on the way to a cut or away from one.
+    def __init__(self, parts: Parts, contact: ContactMonitor, trail: Trail) -> None:
+        """From a push on the way to a cut.
 
         Args:
             parts: Of the sequence.
-            point_id: Point of the stage that the push has ended.
             contact: What the arm feels.
             trail: The way here.
         """
         super().__init__(parts)
-        self.point_id, self._contact, self._trail = point_id, contact, trail
+        self._contact, self._trail = contact, trail
         self._rested = 0
         self._back: BackOff | None = None
 
@@ -504,21 +503,17 @@ class GivingWay(Stage):
         """One period."""
         parts, config = self._parts, self._parts.config
         dt = 1.0 / config.rate_hz
-        parts.look_back(robot, now)
         if self._back is None:
             self._rested = 0 if np.any(robot.sent) else self._rested + 1
             if self._rested * dt >= _REST_S:
                 self._back = BackOff(config.motion, self._trail, config.contact.back_off, dt)
             return self, parts.brake(robot)
         if not self._back.done:
-            tracking = self._back.step(robot, parts.follower, self._contact)
+            # A hard push is a contact, which ends the work.
+            tracking = self._back.step(robot, parts.follower, beyond=False)
             return self, StepResult(tracking.xi, tracking)
-        free = self._back.arrived and not self._contact.beyond
+        free = self._back.arrived and (self._contact.force or 0.0) < config.contact.stop_force
         self._contact.gave_way(free)
-        ticket = parts.queue.get(self.point_id)
-        if ticket is not None and ticket.state == "UNKNOWN":
-            why = reasons.outcome_unknown(self.point_id, ticket.reason or reasons.cutter_unsure())
-            return self, parts.brake(robot, why)
         return Escape(parts), parts.brake(robot)
 
 
@@ -842,6 +837,7 @@ class CutSequence:
         )
         self._stage: Stage = Rest(self._parts)
         self._survey: Survey | None = None
+        self._pushed: Touch | None = None
         self._places: tuple[Array, ...] = ()
 
     @property
@@ -942,33 +938,37 @@ class CutSequence:
         return self._parts.close_ups.due(now)
 
     @property
-    def giving_way(self) -> bool:
-        """Whether the robot goes back from a cane."""
-        return isinstance(self._stage, GivingWay)
-
-    @property
     def may_give_way(self) -> bool:
-        """Whether the robot would give way to a known cane that pushes now."""
-        return self._stage.yields and (self.giving_way or self._parts.gave_way < _PUSHES)
+        """Whether a known cane that pushes now is no contact."""
+        ways_in = Travel | CloseUp | Advance
+        return self._stage.yields and (not isinstance(self._stage, ways_in) or self._parts.gave_way < _PUSHES)
 
-    def give_way(self, contact: ContactMonitor, trail: Trail) -> m.Reason:
-        """Go back from the cane that pushes, and leave the cut that it is in the way of; returns what is logged.
+    def pushed(self, contact: ContactMonitor, trail: Trail) -> m.Reason | None:
+        """React to the push of a known cane: on the way to a cut give it up and go back, on the way out go on.
 
         Args:
             contact: What the arm feels, with the push.
             trail: The way here.
+
+        Returns:
+            What is logged; None without news.
         """
         parts, stage, push = self._parts, self._stage, contact.push
-        assert push is not None
+        if push is None or isinstance(stage, GivingWay):
+            return None
+        why = reasons.cane_in_way(push.part, push.obstacle, float(np.linalg.norm(push.force)))
+        if not isinstance(stage, Travel | CloseUp | Advance):
+            # The way back would lead into the canes.
+            news, self._pushed = push is not self._pushed, push
+            if not contact.beyond:
+                contact.gave_way(free=True)
+            return reasons.cane_on_way_out(why) if news else None
         parts.gave_way += 1
         parts.next_cut.forget()
-        told = why = reasons.cane_in_way(push.part, push.obstacle, float(np.linalg.norm(push.force)))
-        if isinstance(stage, Travel | CloseUp | Advance):
-            parts.close_ups.forget(stage.point_id)
-            parts.queue.resolve(stage.point_id, "FAILED_NOT_CUT", why)
-            told = reasons.point_not_cut(stage.point_id, why)
-        self._stage = GivingWay(parts, stage.point_id, contact, tuple(trail))
-        return told
+        parts.close_ups.forget(stage.point_id)
+        parts.queue.resolve(stage.point_id, "FAILED_NOT_CUT", why)
+        self._stage = GivingWay(parts, contact, tuple(trail))
+        return reasons.point_not_cut(stage.point_id, why)
 
     def hold(self) -> None:
         """Stand for one period in place of `step`. A close-up or a cut that was asked for goes on."""

@@ -160,8 +160,9 @@ class Movement:
     def leave(self, mode: m.Mode) -> None:
         """End the motion source of a mode that has ended."""
         self.stay()
-        self.body.contact.gives_way = False
-        self.body.contact.gave_way(free=True)
+        contact = self.body.contact
+        contact.gives_way = contact.among = False
+        contact.gave_way(free=True)
         if mode == "AUTO":
             self.sequence.abort()
         self.teleoperation.refuse()
@@ -231,10 +232,10 @@ class Movement:
 
     def _work(self, robot: Measured, now: float) -> MotionResult:
         contact = self.body.contact
-        if contact.push is not None and not self.sequence.giving_way:
-            self._event_log.log(self.sequence.give_way(contact, self.body.trail))
+        if (told := self.sequence.pushed(contact, self.body.trail)) is not None:
+            self._event_log.log(told)
         work = self.sequence.step(robot, now)
-        contact.gives_way = self.sequence.may_give_way
+        contact.gives_way, contact.among = self.sequence.may_give_way, bool(self.sequence.in_canes)
         self.tracking = work.tracking
         for event in work.events:
             self._event_log.log(event)
@@ -258,7 +259,7 @@ class Movement:
             self._event_log.log(reasons.backed_off() if self._back_off.arrived else reasons.not_backed_off())
             self._backs_off = False
             return self.ramp()
-        self.tracking = self._back_off.step(robot, self.body.follower, self.body.contact)
+        self.tracking = self._back_off.step(robot, self.body.follower, self.body.contact.beyond)
         return MotionResult(self.tracking.xi)
 
     def _bring_home(self, robot: Measured) -> MotionResult:

@@ -20,6 +20,7 @@ from perception.plant.map import NOTHING_KNOWN, Surroundings
 from perception.segmentation.frame import View, decode_frame
 from perception.segmentation.segmenter import LabelImageSegmenter
 from perception.tracking.close_up import AROUND, check_close_up
+from perception.tracking.picture_shift import PictureShift
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.messages.perception import CloseUpResult
@@ -156,6 +157,16 @@ def test_a_cane_beside_the_place_is_not_taken_for_it_where_nothing_around_agrees
     strange = Surroundings(tuple(axis + [0.0, 0.1, 0.0] for axis in strange.axes), strange.nodes)
     beside = look(view, point(cut, aside=0.008), strange)
     assert beside.finding == "unseen" and beside.reason.code == "which_cane_unclear" and beside.position is None
+
+
+def test_where_the_nodes_do_not_tell_which_internode_is_which_it_abstains(scene: Scene, monkeypatch) -> None:
+    unsure = PictureShift(np.zeros(3), agreed=False)
+    monkeypatch.setattr("perception.tracking.close_up.picture_shift", lambda *_: unsure)
+    for cut, view in scene.pairs():
+        seen = look(view, point(cut))
+        assert seen.finding == "unseen" and seen.reason == reasons.which_internode_unclear() and seen.position is None
+    gone = [look(view_from_clear(without(scene.row, cut), cut), point(cut)).finding for cut in scene.cuts]
+    assert "severed" in gone, "that the wood is off needs no internode"
 
 
 def test_after_the_cut_it_says_that_the_wood_beyond_is_off_and_before_never(scene: Scene) -> None:
