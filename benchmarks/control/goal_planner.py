@@ -114,6 +114,28 @@ class GoalChooser:
             f"something; the best leaves {1e3 * nearest:.0f} mm between {nearest_pair[0]} and {nearest_pair[1]}",
         )
 
+    def least_time(self, q: Array, T_odom_tool: Any, free_axis: bool = False) -> float | None:
+        """The least time (s) in which each actuator alone could be where a sampled posture with the tool there has it.
+
+        From rest to rest at full speed and acceleration, without jerk limit; the base alone drives its straight
+        distance and alone turns to its heading. No motion to one of these postures is quicker. None without one.
+        """
+        found = self._postures(q, T_odom_tool, free_axis, base_fixed=False, good_omega=GOOD_OMEGA)
+        if isinstance(found, str):
+            return None
+        away = found.base[:, :2] - q[:2]
+        turn = np.abs((found.base[:, 2] - q[2] + np.pi) % (2.0 * np.pi) - np.pi)
+        limits = self._limits
+        times = [
+            _bang_bang(np.hypot(away[:, 0], away[:, 1]), limits.drive.velocity, limits.drive.acceleration),
+            _bang_bang(turn, limits.turn.velocity, limits.turn.acceleration),
+            *(
+                _bang_bang(np.abs(found.arm[:, i] - q[5 + i]), rates.velocity, rates.acceleration)
+                for i, rates in enumerate(self._arm_rates)
+            ),
+        ]
+        return float(np.max(times, axis=0).min())
+
     def _postures(self, q: Array, goal: Any, free_axis: bool, base_fixed: bool, good_omega: float) -> "_Postures | str":
         """Every sample's postures inside the joint limits, or why there is none."""
         u = self._samples[free_axis]
@@ -207,6 +229,15 @@ class _Postures:
     cost: Array
 
 
+def _bang_bang(span: Array, velocity: float, acceleration: float) -> Array:
+    """Least time (s) over each span from rest to rest."""
+    ramp = velocity * velocity / acceleration
+    times: Array = np.where(
+        span > ramp, span / velocity + velocity / acceleration, 2.0 * np.sqrt(np.minimum(span, ramp) / acceleration)
+    )
+    return times
+
+
 def _about_y(R: Array, angle: Array) -> Array:
     """R turned about its own y by each angle (N×3×3)."""
     c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
@@ -234,6 +265,10 @@ class GoalPlanner:
         """
         self._chooser = GoalChooser(robot, collision, limits, seed)
         self._paths = PathPlanner(robot, collision, limits, seed)
+
+    def least_time(self, q: Array, T_odom_tool: Any, free_axis: bool = False) -> float | None:
+        """Lower bound of the time to a goal (s); see `GoalChooser.least_time`."""
+        return self._chooser.least_time(q, T_odom_tool, free_axis)
 
     def plan(
         self,

@@ -12,7 +12,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -30,6 +30,8 @@ from rolling_panda.errors import RollingPandaError
 _BATCH = 4
 #: Targets whose ω is written along the way, every so many rows.
 _SAMPLED, _SAMPLE_EVERY = 8, 10
+#: What counts as near (m, rad).
+_NEAR = 0.02, math.radians(5.0)
 _runner: Runner | None = None
 
 
@@ -46,6 +48,8 @@ class Row:
         beyond_reach: True where geometry alone proves that no posture from anywhere has the tool there.
         reason: Why it was refused or what was in the way; empty where nothing was.
         omega: Times (s) and ω of the arm on the way, for the first targets; empty for the others.
+        least_s: Lower bound of the duration (s): each actuator alone; None where no posture is known.
+        steps_s: Time of each of the method's solutions (s).
     """
 
     target: int
@@ -56,6 +60,8 @@ class Row:
     beyond_reach: bool
     reason: str
     omega: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
+    least_s: float | None = None
+    steps_s: tuple[float, ...] = ()
 
 
 def main(argv: Sequence[str]) -> int:
@@ -83,6 +89,10 @@ def summarise(rows: Sequence[Row]) -> dict[str, Any]:
     possible = sum(not row.beyond_reach for row in rows)
     moved = [row.quality for row in rows if row.quality.duration > 0.0] or [row.quality for row in rows]
     done = [row.quality for row in rows if row.quality.reached] or moved
+    settled = [row.quality.settled for row in rows if row.quality.settled is not None]
+    ratios = [row.quality.settled / row.least_s for row in rows if row.quality.settled is not None and row.least_s]
+    near = sum(q.position_error <= _NEAR[0] and q.rotation_error <= _NEAR[1] for q in (row.quality for row in rows))
+    steps_us = 1e6 * np.concatenate([row.steps_s for row in rows]) if any(row.steps_s for row in rows) else np.zeros(1)
     among = share(reached, len(rows))
 
     def broken(kind: str) -> dict[str, float]:
@@ -93,6 +103,7 @@ def summarise(rows: Sequence[Row]) -> dict[str, Any]:
     return {
         "targets": len(rows),
         "reached": reached,
+        "near": near,
         "reached_share": round(reached / len(rows), 4),
         "reached_share_95": [round(among.low or 0.0, 4), round(among.high or 0.0, 4)],
         "beyond_reach": len(rows) - possible,
@@ -101,6 +112,11 @@ def summarise(rows: Sequence[Row]) -> dict[str, Any]:
         "rolling_largest": max(quality.rolling for quality in moved),
         "duration_s_median": round(float(np.median([quality.duration for quality in done])), 2),
         "duration_s_max": round(max(quality.duration for quality in done), 2),
+        "settled_s_median": round(float(np.median(settled)), 2) if settled else None,
+        "settled_over_least_median": round(float(np.median(ratios)), 2) if ratios else None,
+        "settled_over_least_p95": round(float(np.percentile(ratios, 95)), 2) if ratios else None,
+        "step_us_median": round(float(np.median(steps_us)), 1),
+        "step_us_p99": round(float(np.percentile(steps_us, 99)), 1),
         "base_travel_m_mean": round(float(np.mean([quality.base_travel for quality in done])), 3),
         "omega_mean": round(float(np.mean([quality.omega_mean for quality in moved])), 4),
         "omega_least": round(min(quality.omega_least for quality in moved), 4),
@@ -126,8 +142,21 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--starts", choices=("survey", "anywhere"), default="survey", help="posture of drawn starts (default: survey)"
     )
+    parser.add_argument(
+        "--goals",
+        choices=("anywhere", "row"),
+        default="anywhere",
+        help="drawn goals: within ±4 m, or like cuts of a row beside the base (default: anywhere)",
+    )
     parser.add_argument("--free-axis", choices=("none", "tool_y"), default="none", help="of drawn targets")
-    parser.add_argument("--method", choices=METHODS, default="hierarchy", help="(default: hierarchy)")
+    parser.add_argument(
+        "--method",
+        choices=METHODS,
+        nargs="+",
+        default=["hierarchy"],
+        help="one, or several beside each other on the same goals (default: hierarchy); pink, mink, holistic and mpc need "
+        "`make peers`",
+    )
     parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), help="processes (default: all cores)")
     parser.add_argument("--trajectories", type=Path, metavar="DIR", help="write t, q, xi of each target as npz here")
     return parser
@@ -139,24 +168,59 @@ def _run(arguments: argparse.Namespace) -> int:
     targets = (
         reach_targets.read(arguments.targets)
         if arguments.targets is not None
-        else reach_targets.draw(arguments.seed, arguments.count, arguments.free_axis, arguments.starts == "anywhere")
+        else reach_targets.draw(
+            arguments.seed, arguments.count, arguments.free_axis, arguments.starts == "anywhere", arguments.goals
+        )
     )
     for path in (arguments.trajectories, arguments.json.parent if arguments.json is not None else None):
         if path is not None:
-            _make(path)
-    began = time.perf_counter()
-    rows = run(targets, arguments.method, arguments.seed, arguments.jobs, arguments.trajectories)
-    summary = summarise(rows)
-    _print(arguments.method, rows, summary, time.perf_counter() - began)
-    document = {
-        "method": arguments.method,
-        "targets": str(arguments.targets or f"drawn: seed {arguments.seed}, free axis {arguments.free_axis}"),
-        "summary": summary,
-        "samples": [{"target": row.target, "t": row.omega[0], "omega": row.omega[1]} for row in rows[:_SAMPLED]],
-        "results": [_flat(row) for row in rows],
-    }
-    write(arguments.json, document)
+            _made(path)
+    drawn = f"drawn: seed {arguments.seed}, free axis {arguments.free_axis}, goals {arguments.goals}"
+    documents = []
+    for method in arguments.method:
+        began = time.perf_counter()
+        rows = run(targets, method, arguments.seed, arguments.jobs, _folder(arguments, method))
+        summary = summarise(rows)
+        _print(method, rows, summary, time.perf_counter() - began)
+        samples = [{"target": row.target, "t": row.omega[0], "omega": row.omega[1]} for row in rows[:_SAMPLED]]
+        documents.append(
+            {
+                "method": method,
+                "targets": str(arguments.targets or drawn),
+                "summary": summary,
+                "samples": samples,
+                "results": [_flat(row) for row in rows],
+            }
+        )
+        # Whoever waits for the slow ones has the others.
+        write(arguments.json, documents[0] if len(documents) == 1 else {"methods": documents})
+    if len(documents) > 1:
+        _print_beside(documents)
     return 0
+
+
+def _folder(arguments: argparse.Namespace, method: str) -> Path | None:
+    """Where a method's trajectories go: with several methods, one folder each."""
+    if arguments.trajectories is None or len(arguments.method) == 1:
+        return cast("Path | None", arguments.trajectories)
+    return _made(arguments.trajectories / method)
+
+
+def _print_beside(documents: Sequence[dict[str, Any]]) -> None:
+    """A line for each method."""
+    print(
+        f"\n{'':<12}{'reached':>8}{'near':>6}{'there, s':>10}{'over bound':>12}{'clearance':>11}{'p99 of a step':>15}"
+    )
+    for document in documents:
+        found = document["summary"]
+        there, over = (
+            "–" if found[key] is None else f"{found[key]:.2f}"
+            for key in ("settled_s_median", "settled_over_least_median")
+        )
+        print(
+            f"{document['method']:<12}{found['reached']:>8}{found['near']:>6}{there:>10}{over:>12}"
+            f"{1e3 * found['clearance_m_least']:>8.0f} mm{found['step_us_p99']:>12.0f} µs"
+        )
 
 
 def _rows(targets: Sequence[Target], method: MethodName, seed: int, jobs: int, folder: Path | None) -> Iterator[Row]:
@@ -200,9 +264,12 @@ def _row(runner: Runner, index: int, target: Target, folder: Path | None) -> Row
     reason = outcome.reason
     if not quality.reached and not reason:
         reason = "the motion ended or ran out of time before the tool was there"
+    least_s = runner.least_time(target.q, target.T_odom_goal, target.free)
     distance = math.dist(target.T_odom_goal.translation[:2], target.q[:2])
     omega = _omega(runner, done) if index < _SAMPLED else ((), ())
-    return Row(index, distance, quality, outcome.infeasible, outcome.planned_s, beyond, reason, omega)
+    return Row(
+        index, distance, quality, outcome.infeasible, outcome.planned_s, beyond, reason, omega, least_s, outcome.steps_s
+    )
 
 
 def _omega(runner: Runner, done: Trajectory) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -218,6 +285,7 @@ def _print(method: str, rows: Sequence[Row], summary: dict[str, Any], seconds: f
         f"  reached (1 mm, 0.5°, 30 s)   {summary['reached']}"
         f" = {summary['reached_share']:.1%} ({low:.1%} to {high:.1%})"
     )
+    print(f"  within 20 mm and 5°          {summary['near']}")
     if summary["beyond_reach"]:
         others = summary["reached_share_of_the_others"]
         print(
@@ -231,6 +299,11 @@ def _print(method: str, rows: Sequence[Row], summary: dict[str, Any], seconds: f
     print(
         f"  duration                     {summary['duration_s_median']} s median, {summary['duration_s_max']} s at most"
     )
+    if summary["settled_over_least_median"] is not None:
+        print(
+            f"  there, and stays             {summary['settled_s_median']} s median; over the lower bound "
+            f"{summary['settled_over_least_median']} median, {summary['settled_over_least_p95']} p95"
+        )
     print(f"  base travel                  {summary['base_travel_m_mean']} m mean")
     print(f"  ω of the arm                 {summary['omega_mean']} mean, {summary['omega_least']} least")
     print(f"  joint margin                 {summary['joint_margin_rad_least']} rad least")
@@ -239,6 +312,7 @@ def _print(method: str, rows: Sequence[Row], summary: dict[str, Any], seconds: f
         f"{summary['clearance_m_least_at_a_start']} m; at most {summary['clearance_m_lost']} m below start or margin"
     )
     print(f"  infeasible ticks             {summary['infeasible_ticks']}")
+    print(f"  one step                     {summary['step_us_median']} µs median, {summary['step_us_p99']} µs p99")
     print(f"  planning                     {summary['planning_ms_mean']} ms mean")
     failed = [row for row in rows if not row.quality.reached]
     for reason, count in Counter(_kind(row.reason) for row in failed).most_common(8):
@@ -255,13 +329,14 @@ def _kind(reason: str) -> str:
 
 def _flat(row: Row) -> dict[str, Any]:
     fields: dict[str, Any] = asdict(row)
-    del fields["omega"]
+    del fields["omega"], fields["steps_s"]
     quality: dict[str, Any] = fields.pop("quality")
     return fields | quality
 
 
-def _make(folder: Path) -> None:
+def _made(folder: Path) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise RollingPandaError(f"cannot write to {folder}: {error.strerror}") from error
+    return folder

@@ -68,6 +68,7 @@ class Quality:
         position_error: At the end (m).
         rotation_error: At the end (rad); with tool_y free, of the direction of the tool's y.
         duration: (s).
+        settled: From when on the tool is within 1 mm and 0.5° until the end (s); None where it is not at the end.
         base_travel: (m).
         violations: Of limits.
         rolling: Largest ‖A q̇‖ with q̇ = S ξ̇, and largest difference of q from the exact arcs of the wheels.
@@ -82,6 +83,7 @@ class Quality:
     position_error: float
     rotation_error: float
     duration: float
+    settled: float | None
     base_travel: float
     violations: Violations
     rolling: float
@@ -107,10 +109,11 @@ def judge(
     omega = [arm_omega(robot.kinematics(row).J) for row in q]
     margin = np.minimum(q[:, ARM_Q] - limits.lower[ARM_Q], limits.upper[ARM_Q] - q[:, ARM_Q])
     return Quality(
-        reached=bool(position <= POSITION and rotation <= ROTATION),
+        reached=within(error, POSITION, ROTATION),
         position_error=position,
         rotation_error=rotation,
         duration=float(done.t[-1]),
+        settled=_settled(robot, done, goal, free),
         base_travel=float(np.hypot(*np.diff(q[:, :2], axis=0).T).sum()),
         violations=violations(robot, base, done),
         rolling=rolling(robot, done),
@@ -120,6 +123,20 @@ def judge(
         clearance_start=collision.least(q[0]).distance,
         clearance_least=min(collision.least(row).distance for row in [*q[::_LOOK], q[-1]]),
     )
+
+
+def _settled(robot: RobotModel, done: Trajectory, goal: Any, free: bool) -> float | None:
+    since = None
+    for t, q in zip(reversed(done.t), reversed(done.q), strict=True):
+        if not within(goal_error(robot.pose(q, robot.tool_id), goal, free), POSITION, ROTATION):
+            break
+        since = float(t)
+    return since
+
+
+def within(error: Array, position: float, rotation: float) -> bool:
+    """Whether an error (6) is within both (m, rad)."""
+    return bool(float(np.linalg.norm(error[:3])) <= position and float(np.linalg.norm(error[3:])) <= rotation)
 
 
 def goal_error(T_odom_tool: Any, goal: Any, free: bool) -> Array:

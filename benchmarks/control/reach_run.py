@@ -6,7 +6,7 @@ method sends is not limited again, so that a limit that it breaks is seen.
 
 import time
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -14,7 +14,9 @@ from benchmarks.control.goal_planner import GOOD_OMEGA, GoalPlanner
 from benchmarks.control.path import Refused
 from benchmarks.control.plan_follower import PlanFollower
 from benchmarks.control.plan_limits import plan_limits
-from benchmarks.control.reach_judge import POSITION, ROTATION, BaseBounds, Trajectory, goal_error
+from benchmarks.control.reach_judge import POSITION, ROTATION, BaseBounds, Trajectory, goal_error, within
+from benchmarks.peers.predictive import Predictive
+from benchmarks.peers.reactive import REACTIVE, Aimed, reactive
 from controller.config import ControllerConfig, HierarchyConfig, MotionConfig, WholeBodyConfig, WorkConfig
 from controller.motion.follower import tool_error
 from controller.motion.tool_motion import PoseTrajectory, Rates
@@ -24,8 +26,8 @@ from controller.whole_body.task import IkProblem, Method, Posture, Solution, Too
 from rolling_panda.model.differential_drive import NXI, Array
 from rolling_panda.model.robot import RobotModel
 
-MethodName = Literal["hierarchy", "nullspace", "decoupled"]
-METHODS: tuple[MethodName, ...] = ("hierarchy", "nullspace", "decoupled")
+MethodName = Literal["hierarchy", "nullspace", "decoupled", "pink", "mink", "holistic", "mpc"]
+METHODS: tuple[MethodName, ...] = get_args(MethodName)
 #: Longest motion (s), and the control period (s).
 LIMIT_S, DT = 30.0, 0.01
 #: The base's vendor's planner: 0.8 m/s, 0.6 rad/s.
@@ -48,6 +50,7 @@ class Outcome:
         planned_s: Processor time of planning (s).
         reason: Why there is no plan, or the method's last complaint; empty where all went well.
         refused: True where no plan was found and nothing moved.
+        steps_s: Time of each solution (s), on the wall clock.
     """
 
     trajectory: Trajectory
@@ -55,6 +58,7 @@ class Outcome:
     planned_s: float
     reason: str
     refused: bool = False
+    steps_s: tuple[float, ...] = ()
 
 
 class Runner:
@@ -65,22 +69,36 @@ class Runner:
 
         Args:
             method: `hierarchy` follows a plan, base and arm together; `decoupled` a plan that drives, stops, and then
-                reaches, with the same controller; `nullspace` is the paper's: a straight screw, without a plan.
+                reaches, with the same controller; `nullspace` is the paper's: a straight screw, without a plan. The
+                others are peers (`benchmarks.peers`): `pink` and `mink` follow the same screw, `holistic` and `mpc` go
+                to the goal in their own way.
             seed: Of the planner.
+
+        Raises:
+            RollingPandaError: A peer's package is not installed.
         """
         self.robot = RobotModel()
         self.collision = CollisionModel(RobotModel())
         config = bench_config(method)
         self._config, self._method_name = config, method
-        self._method: Method = make_method(self.robot, config.whole_body, DT)
+        self._peer: Aimed | None = None
+        if method in REACTIVE:
+            self._peer = reactive(method, self.robot, config.whole_body, DT)
+        elif method == Predictive.name:
+            self._peer = Predictive(self.robot, config.whole_body, DT)
+        self._method: Method = self._peer or make_method(self.robot, config.whole_body, DT)
         limits = plan_limits(self.robot, BASE.speed, BASE.yaw_rate, config.whole_body.base_acceleration, dt=DT)
         planning = RobotModel()
         self._planner = GoalPlanner(planning, CollisionModel(planning), limits, seed)
 
+    def least_time(self, q: Array, goal: Any, free: bool) -> float | None:
+        """Lower bound of the time to a goal (s); see `GoalChooser.least_time`."""
+        return self._planner.least_time(q, goal, free)
+
     def run(self, q: Array, goal: Any, free: bool, base_fixed: bool = False, good_omega: float = GOOD_OMEGA) -> Outcome:
         """From rest at a configuration (12) towards a tool pose (pin.SE3); see `GoalPlanner.plan`."""
-        if self._method_name == "nullspace":
-            return self._straight(q, goal, free, base_fixed)
+        if self._peer is not None or self._method_name == "nullspace":
+            return self._to_goal(q, goal, free, base_fixed)
         began = time.process_time()
         planned = self._planner.plan(
             q, goal, free, base_fixed, together=self._method_name != "decoupled", good_omega=good_omega
@@ -97,10 +115,13 @@ class Runner:
             if loop.time > LIMIT_S - _STOPPING_S:
                 loop.stop()
             else:
-                loop.take(follower.step(loop.q, kinematics, loop.xi))
+                began_step = time.perf_counter()
+                solution = follower.step(loop.q, kinematics, loop.xi)
+                loop.steps_s.append(time.perf_counter() - began_step)
+                loop.take(solution)
         return loop.outcome(planned_s)
 
-    def _straight(self, q: Array, goal: Any, free: bool, base_fixed: bool) -> Outcome:
+    def _to_goal(self, q: Array, goal: Any, free: bool, base_fixed: bool) -> Outcome:
         config = self._config
         trajectory = PoseTrajectory(
             self.robot.pose(q, self.robot.tool_id),
@@ -108,6 +129,8 @@ class Runner:
             Rates(config.work.tool_speed, config.motion.tool_acceleration, config.motion.tool_jerk),
             Rates(config.motion.tool_turn, 3.0 * config.motion.tool_acceleration, 3.0 * config.motion.tool_jerk),
         )
+        if self._peer is not None:
+            self._peer.aim(goal, free)
         loop, clock = _Loop(self.robot, q), 0.0
         scale = 1.0
         while loop.time < LIMIT_S - DT / 2:
@@ -119,21 +142,25 @@ class Runner:
                 continue
             wanted = trajectory.at(clock)
             error = _GAIN * tool_error(kinematics.T_odom_tool, wanted.T_odom_tool)
-            solution = self._method.solve(
-                IkProblem(
-                    q=loop.q,
-                    kinematics=kinematics,
-                    sent=loop.xi,
-                    tool=ToolTask(wanted.twist + error, free_axis=free),
-                    # No posture is wanted: where the robot is, is right.
-                    posture=Posture(loop.q),
-                    base="frozen" if base_fixed else "free",
-                    scale=scale,
-                )
+            problem = IkProblem(
+                q=loop.q,
+                kinematics=kinematics,
+                sent=loop.xi,
+                tool=ToolTask(wanted.twist + error, free_axis=free),
+                # No posture is wanted: where the robot is, is right.
+                posture=Posture(loop.q),
+                base="frozen" if base_fixed else "free",
+                scale=scale,
             )
+            began = time.perf_counter()
+            solution = self._method.solve(problem)
+            loop.steps_s.append(time.perf_counter() - began)
             scale = solution.scale
             clock += DT * scale
             loop.take(solution)
+        if isinstance(self._peer, Predictive):
+            # Between its turns it only goes on.
+            loop.steps_s = self._peer.seconds
         return loop.outcome(0.0)
 
 
@@ -146,6 +173,8 @@ class _Loop:
         self._rows: list[Array] = [q.copy()]
         self._sent: list[Array] = []
         self._infeasible, self._reason = 0, ""
+        #: Time of each solution (s).
+        self.steps_s: list[float] = []
 
     def take(self, solution: Solution) -> None:
         """One period with what the method sends."""
@@ -171,7 +200,8 @@ class _Loop:
         """What was done."""
         t: Array = DT * np.arange(len(self._rows), dtype=np.float64)
         xi = np.vstack([*self._sent, np.zeros(NXI)])
-        return Outcome(Trajectory(t, np.array(self._rows), xi), self._infeasible, planned_s, self._reason)
+        done = Trajectory(t, np.array(self._rows), xi)
+        return Outcome(done, self._infeasible, planned_s, self._reason, steps_s=tuple(self.steps_s))
 
 
 def bench_config(method: MethodName) -> ControllerConfig:
@@ -197,8 +227,4 @@ def bench_config(method: MethodName) -> ControllerConfig:
 
 
 def _arrived(error: Array, xi: Array) -> bool:
-    return bool(
-        float(np.linalg.norm(error[:3])) < _BETTER * POSITION
-        and float(np.linalg.norm(error[3:])) < _BETTER * ROTATION
-        and float(np.abs(xi).max()) < _REST
-    )
+    return within(error, _BETTER * POSITION, _BETTER * ROTATION) and float(np.abs(xi).max()) < _REST

@@ -18,10 +18,13 @@ from rolling_panda.model.robot import ARM_Q, RobotModel
 
 Number = Annotated[float, Meta(ge=-1e3, le=1e3)]
 FreeAxis = Literal["none", "tool_y"]
+Goals = Literal["anywhere", "row"]
 #: Survey posture, where drawn targets start (rad).
 HOME = (-0.2784, -0.1128, -0.0354, -2.0055, 1.6759, 1.2124, -0.269)
 #: Drawn goals: x and y (m) either way, z (m), tilt of the tool's z from horizontal (rad) either way.
 _SIDE, _HEIGHTS, _TILT = 4.0, (0.4, 1.5), np.radians(40.0)
+#: Goals like cuts of a row: x and y (m), z (m), the tool's yaw from across the row, tilt and roll (rad) either way.
+_ROW_X, _ROW_Y, _ROW_Z, _ROW_TURN = (-0.5, 2.0), (0.65, 0.85), (0.9, 1.3), np.radians([40.0, 20.0, 20.0])
 
 
 #: Joints of starts anywhere (rad).
@@ -96,19 +99,28 @@ def write(path: Path, targets: tuple[Target, ...]) -> None:
     path.write_bytes(msgspec.json.format(msgspec.json.encode(_File(targets)), indent=1) + b"\n")
 
 
-def draw(seed: int, count: int, free_axis: FreeAxis, anywhere: bool = False) -> tuple[Target, ...]:
+def draw(
+    seed: int, count: int, free_axis: FreeAxis, anywhere: bool = False, goals: Goals = "anywhere"
+) -> tuple[Target, ...]:
     """Goals anywhere around a base at the origin, the arm in its survey posture, or anywhere within its limits.
 
     x and y are within 4 m, z is 0.4 to 1.5 m; the approach axis (tool z) has any yaw and is tilted up to 40° from
     horizontal either way, and the roll about it is any. Nothing is left out, so that some goals without a free axis are
-    beyond what the arm can reach from anywhere. Of starts anywhere many are in collision with themselves.
+    beyond what the arm can reach from anywhere. Goals like cuts of a row are at the left of the base, the tool across
+    the row and its y along an upright cane, each within some degrees. Of starts anywhere many are in collision with
+    themselves.
     """
     rng = np.random.default_rng(seed)
     targets = []
     for _ in range(count):
-        position = (*rng.uniform(-_SIDE, _SIDE, 2), rng.uniform(*_HEIGHTS))
-        yaw, roll = rng.uniform(-np.pi, np.pi, 2)
-        tilt = rng.uniform(-_TILT, _TILT)
+        if goals == "row":
+            position = (rng.uniform(*_ROW_X), rng.uniform(*_ROW_Y), rng.uniform(*_ROW_Z))
+            yaw, tilt, roll = rng.uniform(-_ROW_TURN, _ROW_TURN)
+            yaw, roll = yaw + np.pi / 2, roll + np.pi / 2
+        else:
+            position = (*rng.uniform(-_SIDE, _SIDE, 2), rng.uniform(*_HEIGHTS))
+            yaw, roll = rng.uniform(-np.pi, np.pi, 2)
+            tilt = rng.uniform(-_TILT, _TILT)
         R = pin.rpy.rpyToMatrix(0.0, np.pi / 2 - tilt, yaw) @ pin.rpy.rpyToMatrix(0.0, 0.0, roll)
         quaternion = tuple(float(v) for v in pin.Quaternion(R).coeffs())
         goal = msgspec.convert({"position": tuple(map(float, position)), "quat_xyzw": quaternion}, Goal)

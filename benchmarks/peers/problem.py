@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from controller.config import ControllerConfig
+from controller.config import ControllerConfig, WholeBodyConfig
 from controller.whole_body.actuation import Actuation
 from controller.whole_body.task import IkProblem, ToolTask
-from controller.whole_body.velocity_bounds import VelocityBounds
+from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import RobotModel, panda_urdf
 from rolling_panda.resources import resource
 
@@ -24,7 +24,6 @@ def write_problem(folder: Path, demands: Sequence[IkProblem], config: Controller
     last (v, 12, over q), and the posture (12). Limits are over q (12), whose joints are in `names`.
     """
     robot, dt = RobotModel(), 1.0 / config.rate_hz
-    actuation, box = Actuation(robot.drive), VelocityBounds(robot, config.whole_body, dt)
     # Velocities of actuators are no problem for a solver of tool poses.
     demands = [demand for demand in demands if isinstance(demand.tool, ToolTask)]
     targets = []
@@ -34,11 +33,7 @@ def write_problem(folder: Path, demands: Sequence[IkProblem], config: Controller
         targets.append(
             pin.SE3(pin.exp3(twist[3:]) @ T.rotation, T.translation + twist[:3]).homogeneous,
         )
-    wheels = np.abs(actuation.wheels) @ box.speed[:2]
-    velocity = np.concatenate([[box.speed[0]] * 2, [box.speed[1]], wheels, box.speed[2:]])
-    base = [config.whole_body.base_acceleration] * 2
-    arm = robot.limits.acceleration[2:] * config.whole_body.arm_acceleration_scale
-    acceleration = np.concatenate([base, [config.whole_body.base_yaw_acceleration], robot.limits.acceleration[:2], arm])
+    velocity, acceleration = rates(robot, config.whole_body)
     np.savez(
         folder / "problem.npz",
         names=np.array([str(name) for name in robot.model.names][1:]),
@@ -52,10 +47,23 @@ def write_problem(folder: Path, demands: Sequence[IkProblem], config: Controller
         wheel_radius=robot.drive.wheel_radius,
         half_track=robot.drive.half_track,
     )
-    (folder / "robot.urdf").write_text(_urdf(), encoding="utf-8")
+    (folder / "robot.urdf").write_text(robot_urdf(), encoding="utf-8")
 
 
-def _urdf() -> str:
+def rates(robot: RobotModel, config: WholeBodyConfig) -> tuple[Array, Array]:
+    """Limits of velocity and of acceleration over q (12)."""
+    speed = [config.base_speed, config.base_yaw_rate]
+    wheels = np.abs(Actuation(robot.drive).wheels) @ speed
+    velocity = robot.limits.velocity[2:] * config.arm_velocity_scale
+    arm = robot.limits.acceleration[2:] * config.arm_acceleration_scale
+    base = [config.base_acceleration] * 2 + [config.base_yaw_acceleration]
+    return (
+        np.concatenate([[speed[0]] * 2, [speed[1]], wheels, velocity]),
+        np.concatenate([base, robot.limits.acceleration[:2], arm]),
+    )
+
+
+def robot_urdf() -> str:
     """Base, arm and tool in one description, without shapes."""
     whole = ET.Element("robot", name="rolling_panda")
     texts = (
