@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 TYPESCRIPT := typescript@5.9.3
 
-.PHONY: help demo test test-training fast coverage check format docs bench mutation clean lock materials browser systemd drivers training
+.PHONY: help demo test test-training fast coverage check format docs bench mutation clean lock materials browser systemd drivers training peers
 .DEFAULT_GOAL := help
 
 help:
@@ -162,6 +162,12 @@ $(VENV)/.training: $(VENV)/.project requirements-training.lock
 	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-training.lock -c requirements-training.lock
 	@touch $@
 
+# Others' controllers, for `make bench ARGS='reach --method hierarchy mink'`.
+peers: $(VENV)/.peers
+$(VENV)/.peers: $(VENV)/.project requirements-peers.lock
+	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-peers.lock -c requirements-peers.lock
+	@touch $@
+
 # The control code becomes machine code when it is first imported: better here than at the first start.
 $(VENV)/.project: $(VENV)/.locked pyproject.toml
 	@$(call library,libgomp.so.1,libgomp1,Pinocchio needs)
@@ -184,7 +190,7 @@ lock:
 	$(COMPILE) --extra dev --output-file requirements.lock pyproject.toml
 	$(COMPILE) --constraint requirements.lock --output-file requirements-run.lock pyproject.toml
 	$(COMPILE) --constraint requirements.lock --extra real --output-file requirements-real.lock pyproject.toml
-	for extra in training docs; do \
+	for extra in training docs peers; do \
 		$(BIN)/python -c 'import sys, tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"][sys.argv[1]], sep="\n")' $$extra \
 			| $(COMPILE) --constraint requirements.lock --output-file requirements-$$extra.lock - || exit 1; \
 	done

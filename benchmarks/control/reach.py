@@ -49,7 +49,7 @@ class Row:
         reason: Why it was refused or what was in the way; empty where nothing was.
         omega: Times (s) and ω of the arm on the way, for the first targets; empty for the others.
         least_s: Lower bound of the duration (s): each actuator alone; None where no posture is known.
-        steps_s: Time of each of the method's solutions (s).
+        steps_s: Processor time of each of the method's solutions (s).
     """
 
     target: int
@@ -154,8 +154,7 @@ def _parser() -> argparse.ArgumentParser:
         choices=METHODS,
         nargs="+",
         default=["hierarchy"],
-        help="one, or several beside each other on the same goals (default: hierarchy); pink, mink, holistic and mpc need "
-        "`make peers`",
+        help="one, or several on the same goals (default: hierarchy); pink, mink, holistic and mpc need `make peers`",
     )
     parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), help="processes (default: all cores)")
     parser.add_argument("--trajectories", type=Path, metavar="DIR", help="write t, q, xi of each target as npz here")

@@ -25,6 +25,7 @@ from benchmarks.control.row_report import Cut, RowRun, mean_stages, summarise, t
 from benchmarks.control.row_stages import StageClock
 from benchmarks.control.row_supervisor import Supervisor
 from benchmarks.control.row_walk import walk
+from benchmarks.peers.reactive import in_rows
 from bridge.sim.robot import trace
 from bridge.sim.robot.robot import SimulatedRobot
 from bridge.sim.vineyard.row import Row
@@ -51,6 +52,8 @@ _LOOK_S, _LIMIT_S = 3.0, 120.0
 _AFTER_S = 3.0
 #: Periods between two looks at what touches a cane.
 _LOOK_EVERY = 4
+#: Controllers of others that can work off a row.
+_PEERS = ("pink", "mink")
 
 
 def cut_row(
@@ -303,8 +306,8 @@ def main(argv: Sequence[str]) -> int:
     parser.add_argument(
         "--method",
         action="append",
-        choices=tuple(METHODS),
-        help="whole-body method; may be given several times (default: all of them)",
+        choices=(*METHODS, *_PEERS),
+        help="whole-body method; may be given several times (default: ours; the peers need `make peers`)",
     )
     parser.add_argument(
         "--along",
@@ -324,6 +327,7 @@ def main(argv: Sequence[str]) -> int:
     parser.add_argument("--plot", type=Path, metavar="FILE", help="draw the time of a cut by method and stage (PNG)")
     arguments = parser.parse_args(argv)
     methods = arguments.method or list(METHODS)
+    METHODS.update({name: in_rows(name) for name in _PEERS if name in methods})
     runs: list[RowRun] = []
     print(f"{'method':<10} {'seed':>4} {'accepted':>8} {'right':>6} {'s a cut':>8} {'contacts':>8} {'× real time':>11}")
     for seed in range(arguments.seed, arguments.seed + arguments.count):

@@ -74,7 +74,7 @@ def main(argv: Sequence[str]) -> int:
         "--environments",
         type=Path,
         metavar="DIR",
-        help="virtual environments of the peers: DIR/pin-pink, DIR/mink, DIR/placo, DIR/tsid (default: this one)",
+        help="virtual environments of the peers: DIR/placo, DIR/tsid (default: this one)",
     )
     arguments = parser.parse_args(argv)
     if arguments.steps < 1:

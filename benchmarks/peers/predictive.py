@@ -46,7 +46,10 @@ class Predictive:
             import crocoddyl
             import mim_solvers
         except ImportError as error:
-            raise RollingPandaError(f"mpc is not installed ({error}); `make peers` installs it") from error
+            raise RollingPandaError(
+                f"mpc is not installed ({error}); it needs `pip install --no-deps crocoddyl libcrocoddyl mim-solvers "
+                "libmim-solvers`: with its dependencies, Crocoddyl would change the robot's model"
+            ) from error
         self._dt, self._actuation = dt, Actuation(robot.drive)
         self._manipulability = ArmManipulability()
         self._solver_of = mim_solvers.SolverCSQP
@@ -55,7 +58,7 @@ class Predictive:
         self._last = _model(crocoddyl, RobotModel(), config, last=True)
         self._greatest = self._last.acceleration
         self._fastest = self._last.velocity
-        #: Seconds of each of the solver's turns.
+        #: Processor time of each of the solver's turns (s).
         self.seconds: list[float] = []
         self._states: list[Array] = []
         self._inputs: list[Array] = []
@@ -80,7 +83,7 @@ class Predictive:
         return Solution(xi, 1.0, self._manipulability.at(problem.kinematics.J).value)
 
     def _plan(self, x: Array) -> None:
-        began = time.perf_counter()
+        began = time.thread_time()
         solver = self._solver_of(self._shooting_of(x, self._running, self._last))
         solver.termination_tolerance = 1e-4
         solver.max_qp_iters = 50
@@ -93,7 +96,7 @@ class Predictive:
             self._states, self._inputs = [np.array(x) for x in solver.xs], found
         else:
             self._states, self._inputs = [x.copy() for _ in range(_KNOTS + 1)], [np.zeros(NXI) for _ in range(_KNOTS)]
-        self.seconds.append(time.perf_counter() - began)
+        self.seconds.append(time.thread_time() - began)
 
 
 def _model(crocoddyl: Any, robot: RobotModel, config: WholeBodyConfig, last: bool) -> Any:
@@ -105,7 +108,7 @@ def _model(crocoddyl: Any, robot: RobotModel, config: WholeBodyConfig, last: boo
     acceleration = np.concatenate([[config.base_acceleration, config.base_yaw_acceleration], arm_acceleration])
     bounds = 7 + NXI + (0 if last else NXI)
 
-    class Knot(crocoddyl.ActionModelAbstract):  # type: ignore[misc,name-defined]
+    class Knot(crocoddyl.ActionModelAbstract):  # type: ignore[misc]
         """Integration over one step, costs and bounds."""
 
         def __init__(self) -> None:

@@ -6,7 +6,6 @@ time, as it does for the method `nullspace`. None of them knows obstacles or the
 
 import math
 from collections.abc import Callable
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any, Protocol
 
 import daqp
@@ -17,9 +16,12 @@ from benchmarks.peers.problem import rates, robot_urdf
 from controller.config import WholeBodyConfig
 from controller.motion.follower import tool_error
 from controller.whole_body.actuation import Actuation
+from controller.whole_body.collision import CollisionModel
+from controller.whole_body.guards.collision import CollisionGuard
 from controller.whole_body.manipulability import ArmManipulability
+from controller.whole_body.registry import Maker, SpeedScaling
 from controller.whole_body.saturation import Saturation
-from controller.whole_body.task import IkProblem, Method, Solution, ToolTask
+from controller.whole_body.task import ActuatorTask, IkProblem, Method, Solution, ToolTask
 from rolling_panda.errors import RollingPandaError
 from rolling_panda.model.differential_drive import NQ, NXI, Array
 from rolling_panda.model.robot import ARM_Q, ARM_XI, RobotModel
@@ -57,7 +59,7 @@ class _Peer:
     def solve(self, problem: IkProblem) -> Solution:
         """The actuator velocities that answer the problem; see `Method.solve`."""
         omega = self._manipulability.at(problem.kinematics.J).value
-        wanted = self._wanted(problem)
+        wanted = problem.tool.xi if isinstance(problem.tool, ActuatorTask) else self._wanted(problem)
         if wanted is None or not np.isfinite(wanted).all():
             return Solution(self._saturation.brake(problem.sent), 0.0, omega, False, f"{self.name} has no answer")
         limited = self._saturation.apply(wanted, problem.q, problem.sent)
@@ -65,6 +67,14 @@ class _Peer:
 
     def _wanted(self, problem: IkProblem) -> Array | None:
         raise NotImplementedError
+
+    def _constraints(self, problem: IkProblem, rolling: Any, wheels: Any) -> list[Any]:
+        """Rolling, and the wheels' velocities where they are given: at rest, or as they are measured."""
+        if not problem.arm_only:
+            return [rolling]
+        held = problem.held if problem.base != "frozen" else None
+        wheels.moved = np.zeros(2) if held is None else held * self._dt
+        return [rolling, wheels]
 
     def _target(self, problem: IkProblem) -> Any:
         """The pose (pin.SE3) that the tool has after one period of its twist."""
@@ -95,7 +105,7 @@ class Pink(_Peer):
         self._posture = PostureTask(cost=_POSTURE, gain=_POSTURE_GAIN)
         self._acceleration = AccelerationLimit(self._model, acceleration)
         self._limits = [ConfigurationLimit(self._model), VelocityLimit(self._model), self._acceleration]
-        self._rolling = _rolling(pink.tasks.Task, robot, cost=1.0, gain=1.0)
+        self._rolling, self._wheels = _constraints_of(pink.tasks.Task, robot, list(range(NQ)), cost=1.0, gain=1.0)
 
     def _wanted(self, problem: IkProblem) -> Array | None:
         assert isinstance(problem.tool, ToolTask)
@@ -111,7 +121,7 @@ class Pink(_Peer):
                 self._dt,
                 solver="daqp",
                 limits=self._limits,
-                constraints=[self._rolling],
+                constraints=self._constraints(problem, self._rolling, self._wheels),
                 safety_break=False,
             )
         except self._pink.exceptions.PinkError:
@@ -145,7 +155,7 @@ class Mink(_Peer):
         self._posture = mink.PostureTask(model, cost=_POSTURE, gain=_POSTURE_GAIN)
         self._limits = [mink.ConfigurationLimit(model), mink.VelocityLimit(model, speeds)]
         self._configuration = mink.Configuration(model)
-        self._rolling = _rolling(mink.Task, robot, self._order, cost=np.ones(3), gain=1.0)
+        self._rolling, self._wheels = _constraints_of(mink.Task, robot, self._order, cost=np.ones(1), gain=1.0)
 
     def _wanted(self, problem: IkProblem) -> Array | None:
         assert isinstance(problem.tool, ToolTask)
@@ -160,7 +170,7 @@ class Mink(_Peer):
                 self._dt,
                 "daqp",
                 limits=self._limits,
-                constraints=[self._rolling],
+                constraints=self._constraints(problem, self._rolling, self._wheels),
             )
         except self._mink.MinkError:
             return None
@@ -263,12 +273,16 @@ def reactive(name: str, robot: RobotModel, config: WholeBodyConfig, dt: float) -
         raise RollingPandaError(f"{name} is not installed ({error}); `make peers` installs it") from error
 
 
-def version_of(package: str) -> str:
-    """Of an installed package; empty where it is not."""
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return ""
+def in_rows(name: str) -> Maker:
+    """A peer for the controller: like methods without inequalities of their own it is braked before obstacles."""
+
+    def maker(robot: RobotModel, config: WholeBodyConfig, dt: float, collision: CollisionModel | None) -> Method:
+        method = reactive(name, robot, config, dt)
+        if collision is None or not config.hierarchy.collisions:
+            return method
+        return SpeedScaling(method, CollisionGuard(collision, config.hierarchy, dt), Saturation(robot, config, dt))
+
+    return maker
 
 
 def _turning(free: bool) -> Any:
@@ -276,22 +290,33 @@ def _turning(free: bool) -> Any:
     return [_TOOL, 0.0 if free else _TOOL, _TOOL]
 
 
-def _rolling(task: Any, robot: RobotModel, order: list[int] | None = None, **costs: Any) -> Any:
-    """A(q) Δq = 0 as a task of Pink or mink; `order` has our index of each of its joints."""
-    columns = order or list(range(NQ))
-    heading = columns.index(2)
+def _constraints_of(task: Any, robot: RobotModel, order: list[int], **costs: Any) -> tuple[Any, Any]:
+    """A(q) Δq = 0, and given wheels, as tasks of Pink or mink; `order` has our index of each of its joints."""
+    heading, pick = order.index(2), np.eye(NQ)[3:5][:, order]
 
     class Rolling(task):  # type: ignore[misc]
         def compute_error(self, configuration: Any) -> Any:
             return np.zeros(3)
 
         def compute_jacobian(self, configuration: Any) -> Any:
-            return robot.drive.constraint(float(configuration.q[heading]))[:, columns]
+            return robot.drive.constraint(float(configuration.q[heading]))[:, order]
 
         def __repr__(self) -> str:
             return "Rolling()"
 
-    return Rolling(**costs)
+    class Wheels(task):  # type: ignore[misc]
+        moved = np.zeros(2)
+
+        def compute_error(self, configuration: Any) -> Any:
+            return -self.moved
+
+        def compute_jacobian(self, configuration: Any) -> Any:
+            return pick
+
+        def __repr__(self) -> str:
+            return "Wheels()"
+
+    return Rolling(**costs), Wheels(**costs)
 
 
 def _mujoco_model() -> Any:

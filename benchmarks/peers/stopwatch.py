@@ -58,9 +58,14 @@ def rolling(problem: dict[str, Any], q: Any) -> Any:
 
 
 def report(name: str, version: str, note: str, step: Callable[[int], Any], count: int) -> None:
-    """Time `step(i)` for i in 0…count − 1 after as many again for warming up, and print the result.
+    """Time the steps, and print the result; see `timed`."""
+    print(json.dumps({"name": name, "version": version, "note": note, **timed(step, count)}))
 
-    A step returns the velocities over q, or None where the solver found none, which is counted.
+
+def timed(step: Callable[[int], Any], count: int) -> dict[str, Any]:
+    """Times of `step(i)` for i in 0…count − 1 (µs), after the first 200 for warming up.
+
+    A step returns the velocities, or None where the solver found none, which is counted.
     """
     for i in range(min(count, 200)):
         step(i)
@@ -72,19 +77,13 @@ def report(name: str, version: str, note: str, step: Callable[[int], Any], count
         v = step(i)
         seconds.append(time.perf_counter() - begin)
         failed += v is None or not np.isfinite(v).all()
+    gc.enable()
     micros = np.array(seconds) * 1e6
-    print(
-        json.dumps(
-            {
-                "name": name,
-                "version": version,
-                "note": note,
-                "median_us": round(float(np.median(micros)), 1),
-                "p99_us": round(float(np.percentile(micros, 99)), 1),
-                "max_us": round(float(micros.max()), 1),
-                "histogram": histogram(micros),
-                "steps": count,
-                "failed": int(failed),
-            }
-        )
-    )
+    return {
+        "median_us": round(float(np.median(micros)), 1),
+        "p99_us": round(float(np.percentile(micros, 99)), 1),
+        "max_us": round(float(micros.max()), 1),
+        "histogram": histogram(micros),
+        "steps": count,
+        "failed": int(failed),
+    }

@@ -1,4 +1,5 @@
 import json
+import sys
 
 import numpy as np
 import pytest
@@ -7,8 +8,10 @@ from benchmarks.__main__ import main
 from benchmarks.control import reach, reach_targets
 from benchmarks.control.arm_ik import ArmIk
 from benchmarks.control.reach_judge import BaseBounds, Trajectory, judge, rolling, violations
-from benchmarks.control.reach_run import BASE, Runner
+from benchmarks.control.reach_run import BASE, Runner, bench_config
+from benchmarks.peers.reactive import reactive
 from controller.whole_body.collision import CollisionModel
+from controller.whole_body.task import IkProblem, Posture, ToolTask
 from rolling_panda.errors import InputError
 from rolling_panda.model.robot import RobotModel
 
@@ -158,6 +161,75 @@ def test_driving_first_takes_longer_and_a_straight_screw_reaches_less():
     assert len(together) == len(apart) and np.mean(apart) > np.mean(together) + 0.5
     straight = sum(row.quality.reached for row in by_method["nullspace"])
     assert straight < len(together)
+
+
+@pytest.mark.parametrize("goals", ["anywhere", "row"])
+def test_no_motion_is_quicker_than_its_lower_bound(goals):
+    rows = reach.run(reach_targets.draw(22, 6, "none", goals=goals), "hierarchy", 0, 1)
+    bounds = [(row.least_s, row.quality) for row in rows if row.least_s is not None]
+    assert len(bounds) >= 5
+    for least_s, quality in bounds:
+        assert 0.3 < least_s < quality.duration
+        assert quality.settled is not None and quality.settled <= quality.duration
+    assert 1.0 < reach.summarise(rows)["settled_over_least_median"] < 4.0
+
+
+def test_goals_like_cuts_are_left_of_the_base_with_the_tool_across_the_row():
+    for target in reach_targets.draw(23, 30, "none", goals="row"):
+        goal = target.T_odom_goal
+        assert -0.5 <= goal.translation[0] <= 2.0 and 0.65 <= goal.translation[1] <= 0.85
+        assert goal.rotation[1, 2] > 0.7 and goal.rotation[2, 1] > 0.85
+
+
+def test_settled_is_when_the_tool_comes_for_good_and_none_where_it_leaves_again():
+    q = still(9).q
+    q[3:6, 11] += 0.5
+    goal = ROBOT.pose(q[0], ROBOT.tool_id)
+    moving = Trajectory(0.01 * np.arange(9), q, np.zeros((9, 9)))
+    assert judge(ROBOT, CollisionModel(RobotModel()), BASE, moving, goal, False).settled == pytest.approx(0.06)
+    gone = Trajectory(0.01 * np.arange(5), q[:5], np.zeros((5, 9)))
+    assert judge(ROBOT, CollisionModel(RobotModel()), BASE, gone, goal, False).settled is None
+
+
+def test_a_peer_that_is_not_installed_is_refused_with_how_to_get_it(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "mink", None)
+    assert main(["reach", "--count", "1", "--jobs", "1", "--method", "mink"]) == 1
+    assert "mink is not installed" in (error := capsys.readouterr().err) and "make peers" in error
+    monkeypatch.setitem(sys.modules, "crocoddyl", None)
+    assert main(["reach", "--count", "1", "--jobs", "1", "--method", "mpc"]) == 1
+    assert "pip install --no-deps crocoddyl" in capsys.readouterr().err
+
+
+def test_methods_are_judged_beside_each_other_on_the_same_goals(tmp_path, capsys):
+    path = tmp_path / "reach.json"
+    words = ["--count", "2", "--seed", "41", "--goals", "row", "--jobs", "1", "--json", str(path)]
+    assert reach.main([*words, "--method", "hierarchy", "holistic"]) == 0
+    ours, theirs = json.loads(path.read_text())["methods"]
+    assert [ours["method"], theirs["method"]] == ["hierarchy", "holistic"]
+    assert [row["least_s"] for row in ours["results"]] == [row["least_s"] for row in theirs["results"]]
+    for document in (ours, theirs):
+        assert document["summary"]["violations"]["velocity"]["count"] == 0
+        assert document["summary"]["violations"]["acceleration"]["count"] == 0
+        assert document["summary"]["step_us_p99"] > 10.0
+    assert theirs["summary"]["near"] >= 1
+    table = capsys.readouterr().out.splitlines()[-2:]
+    assert table[0].startswith("hierarchy") and table[1].startswith("holistic")
+
+
+@pytest.mark.parametrize("name", ["pink", "mink"])
+def test_an_installed_peer_follows_a_twist_within_the_limits_and_leaves_frozen_wheels_alone(name):
+    pytest.importorskip(name, reason=f"{name} is not installed: make peers")
+    config = bench_config("hierarchy").whole_body
+    method = reactive(name, ROBOT, config, 0.01)
+    q = still().q[0]
+    kinematics = ROBOT.kinematics(q)
+    twist = np.array([0.0, 0.05, 0.0, 0.0, 0.0, 0.0])
+    xi = np.zeros(9)
+    for _ in range(30):
+        problem = IkProblem(q, kinematics, xi, ToolTask(twist), Posture(q), base="frozen")
+        xi = method.solve(problem).xi
+    assert np.abs(xi[:2]).max() < 1e-6
+    np.testing.assert_allclose(kinematics.J_xi @ xi, twist, atol=2e-3)
 
 
 def test_the_command_prints_a_table_and_writes_every_figure(tmp_path, capsys):
