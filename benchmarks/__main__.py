@@ -18,6 +18,10 @@ BENCHMARKS = {
         "a whole vine with a reviewer: seconds of machine and person, every cut judged",
     ),
     "reach": ("benchmarks.control.reach", "tool poses anywhere around the robot: reached, limits, manipulability"),
+    "approach": (
+        "benchmarks.control.approach",
+        "the arm's ways to cuts among wood that stays, beside planners of OMPL",
+    ),
     "arm": ("benchmarks.control.arm", "the arm alone between random poses, beside published figures"),
     "contact": (
         "benchmarks.control.contact",

@@ -16,7 +16,7 @@ from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import ARM_Q
 
 #: Largest joint step (rad) between two collision checks.
-_LOOK = 0.05
+_LOOK = 0.02
 #: Largest joint step of the trees (rad), largest number of their extensions, and number of shortcut attempts.
 _GROW, _GROWTHS, _CUTS = 0.5, 400, 40
 #: Postures (joints 2 to 7) with the arm folded over its base, as intermediate goals.

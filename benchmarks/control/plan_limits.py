@@ -54,6 +54,7 @@ def plan_limits(
     arm_acceleration_scale: float = 0.5,
     joint_margin: float = 0.03,
     dt: float = 0.01,
+    clearance: float = 0.02,
 ) -> PlanLimits:
     """Limits for planning, below the robot's own limits to leave margin for feedback.
 
@@ -67,6 +68,7 @@ def plan_limits(
         arm_acceleration_scale: Fraction of its rated accelerations.
         joint_margin: Distance kept from every joint limit (rad).
         dt: Control period (s).
+        clearance: Distance kept between the robot's parts, from the ground and from obstacles (m).
     """
     return PlanLimits(
         drive=Rates(0.95 * base_speed, base_acceleration, 4.0),
@@ -77,5 +79,6 @@ def plan_limits(
         arm_jerk=0.02 * robot.limits.jerk[ARM_XI],
         lower=robot.limits.lower[ARM_Q] + joint_margin,
         upper=robot.limits.upper[ARM_Q] - joint_margin,
+        clearance=clearance,
         dt=dt,
     )
