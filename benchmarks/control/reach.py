@@ -308,7 +308,7 @@ def _print(method: str, rows: Sequence[Row], summary: dict[str, Any], seconds: f
     print(f"  joint margin                 {summary['joint_margin_rad_least']} rad least")
     print(
         f"  clearance                    {summary['clearance_m_least']} m least, at a start "
-        f"{summary['clearance_m_least_at_a_start']} m; at most {summary['clearance_m_lost']} m below start or margin"
+        f"{summary['clearance_m_least_at_a_start']} m; at most {summary['clearance_m_lost']} m below start or kept"
     )
     print(f"  infeasible ticks             {summary['infeasible_ticks']}")
     print(f"  one step                     {summary['step_us_median']} µs median, {summary['step_us_p99']} µs p99")

@@ -1,5 +1,6 @@
 """What a motion was like, judged from its trajectory alone: errors, limits by finite differences, room, and ω."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -7,15 +8,15 @@ import numpy as np
 
 from controller.config import HierarchyConfig
 from controller.motion.follower import tool_error
-from controller.whole_body.collision import CollisionModel
+from controller.whole_body.collision import CollisionModel, Pair
 from controller.whole_body.manipulability import arm_omega
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import ARM_Q, RobotModel
 
 #: A goal counts as reached within these (m, rad).
 POSITION, ROTATION = 1e-3, np.radians(0.5)
-#: Distance that the controller keeps (m).
-KEPT = HierarchyConfig().collision_distance
+#: What the controller keeps of each pair.
+_CONFIG = HierarchyConfig()
 #: Rows between two looks at the distances.
 _LOOK = 5
 #: What finite differences of rounded numbers may be above a limit.
@@ -77,6 +78,8 @@ class Quality:
         margin_least: Least distance to a joint limit (rad).
         clearance_least: Least distance between the robot's parts and from the ground (m), looked at every fifth row.
         clearance_start: The same at the start (m).
+        clearance_lost: How far a pair came below what the controller keeps of it, or below its distance at the start
+            where that was less (m); negative where each had more.
     """
 
     reached: bool
@@ -92,11 +95,7 @@ class Quality:
     margin_least: float
     clearance_least: float
     clearance_start: float
-
-    @property
-    def clearance_lost(self) -> float:
-        """How far the clearance went below that of the start, or below the kept one where that is less (m)."""
-        return min(self.clearance_start, KEPT) - self.clearance_least
+    clearance_lost: float
 
 
 def judge(
@@ -107,6 +106,7 @@ def judge(
     error = goal_error(robot.pose(q[-1], robot.tool_id), goal, free)
     position, rotation = float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:]))
     omega = [arm_omega(robot.kinematics(row).J) for row in q]
+    looked = [*q[::_LOOK], q[-1]]
     margin = np.minimum(q[:, ARM_Q] - limits.lower[ARM_Q], limits.upper[ARM_Q] - q[:, ARM_Q])
     return Quality(
         reached=within(error, POSITION, ROTATION),
@@ -121,8 +121,28 @@ def judge(
         omega_least=float(np.min(omega)),
         margin_least=float(margin.min()),
         clearance_start=collision.least(q[0]).distance,
-        clearance_least=min(collision.least(row).distance for row in [*q[::_LOOK], q[-1]]),
+        clearance_least=min(collision.least(row).distance for row in looked),
+        clearance_lost=_lost(collision, looked),
     )
+
+
+def _lost(collision: CollisionModel, rows: Sequence[Array]) -> float:
+    most = max(_CONFIG.collision_distance, _CONFIG.cane_distance)
+    start = _near(collision, rows[0], np.inf)
+    lost = -np.inf
+    for row in rows:
+        for pair, distance in _near(collision, row, most).items():
+            lost = max(lost, min(start.get(pair, np.inf), _CONFIG.kept(pair)) - distance)
+    return float(lost) if np.isfinite(lost) else -most
+
+
+def _near(collision: CollisionModel, q: Array, within: float) -> dict[Pair, float]:
+    """The least distance of each pair of parts nearer than `within` (m)."""
+    found = collision.distances(q, within)
+    out: dict[Pair, float] = {}
+    for pair, distance in zip(found.pairs, found.distance.tolist(), strict=True):
+        out.setdefault(pair, distance)
+    return out
 
 
 def _settled(robot: RobotModel, done: Trajectory, goal: Any, free: bool) -> float | None:

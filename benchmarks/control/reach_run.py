@@ -38,6 +38,8 @@ _STOPPING_S = 0.8
 #: A motion ends when the tool is nearer than this share of the tolerance and every joint and wheel as good as at rest
 #: (rad/s), so that it may stop within one period.
 _BETTER, _REST = 0.2, 0.02
+#: Periods within the tolerance after which a motion without a plan has ended.
+_HOVER = 100
 
 
 @dataclass(frozen=True)
@@ -132,10 +134,13 @@ class Runner:
         if self._peer is not None:
             self._peer.aim(goal, free)
         loop, clock = _Loop(self.robot, q), 0.0
-        scale = 1.0
+        scale, there = 1.0, 0
         while loop.time < LIMIT_S - DT / 2:
             kinematics = self.robot.kinematics(loop.q)
-            if clock >= trajectory.duration and _arrived(goal_error(kinematics.T_odom_tool, goal, free), loop.xi):
+            left = goal_error(kinematics.T_odom_tool, goal, free)
+            # Some peers hover about the goal.
+            there = there + 1 if within(left, POSITION, ROTATION) else 0
+            if there > _HOVER or (clock >= trajectory.duration and _arrived(left, loop.xi)):
                 break
             if loop.time > LIMIT_S - _STOPPING_S:
                 loop.stop()

@@ -181,6 +181,18 @@ def test_goals_like_cuts_are_left_of_the_base_with_the_tool_across_the_row():
         assert goal.rotation[1, 2] > 0.7 and goal.rotation[2, 1] > 0.85
 
 
+def test_a_pair_loses_clearance_only_below_what_is_kept_of_it_or_what_it_began_with():
+    q = still(40).q
+    # A posture that runs the tool into the base.
+    q = np.linspace(q[0], reach_targets.draw(43, 83, "none", anywhere=True)[82].q, 40)
+    t, xi = 0.01 * np.arange(40), np.zeros((40, 9))
+    goal, collision = ROBOT.pose(q[-1], ROBOT.tool_id), CollisionModel(RobotModel())
+    came_nearer = judge(ROBOT, collision, BASE, Trajectory(t, q, xi), goal, False)
+    began_there = judge(ROBOT, collision, BASE, Trajectory(t, np.tile(q[-1], (40, 1)), xi), goal, False)
+    assert came_nearer.clearance_least == began_there.clearance_least < 0.0
+    assert came_nearer.clearance_lost > 0.0 and began_there.clearance_lost == pytest.approx(0.0, abs=1e-9)
+
+
 def test_settled_is_when_the_tool_comes_for_good_and_none_where_it_leaves_again():
     q = still(9).q
     q[3:6, 11] += 0.5
