@@ -60,6 +60,7 @@ class ContactWorld(RobotWorld):
         world: WorldConfig = CALM,
         seed: int = 0,
         config: ControllerConfig | None = None,
+        canes: Sequence[Rod] = (),
     ) -> None:
         """Arm the robot.
 
@@ -70,6 +71,7 @@ class ContactWorld(RobotWorld):
             world: Disturbances.
             seed: Of the disturbances.
             config: Section `[controller]`.
+            canes: What perception knows as canes, and not as obstacles: nobody has decided that they stay.
         """
         # There is no camera, so that nothing is looked at from near.
         settings = controller_config(
@@ -87,6 +89,7 @@ class ContactWorld(RobotWorld):
         self.rests: list[float] = []
         self.events: list[m.Reason] = []
         self.cut_ids: set[str] = set()
+        self._canes = tuple((vector3(rod.start), vector3(rod.end)) for rod in canes)
         self._seen, self._shown, self._moving = tuple(seen), 0, False
         self.state: m.ControllerState | None = None
         super().__init__(
@@ -135,7 +138,7 @@ class ContactWorld(RobotWorld):
         )
         self._shown = wanted
         header = m.Header(self.now, "odom")
-        self.say(m.PruningPoints(header=header, segmenter="none", frames=1, points=points))
+        self.say(m.PruningPoints(header=header, segmenter="none", frames=1, points=points, canes=self._canes))
         self.run(0.02)
         self.command(intents.AcceptAll(user=USER, confidence=0.0))
 
