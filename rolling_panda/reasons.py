@@ -2725,8 +2725,8 @@ def cane_in_way(part: str, other: str, force_n: float) -> None:
 
 
 @_reason("info", "")
-def cane_on_way_out(why: Reason) -> None:
-    """A cane pushes on the way out of the canes, on which the robot goes on. {why}."""
+def cane_on_way_out(part: str, other: str, force_n: float) -> None:
+    """A cane pushes on the way out, about {force_n:.0f} N: {part}, and probably {other}. The robot goes on."""
 
 
 @_reason("info", "")

@@ -837,6 +837,7 @@ class CutSequence:
         )
         self._stage: Stage = Rest(self._parts)
         self._survey: Survey | None = None
+        #: The push on the last way out, which may last until the next way in has begun.
         self._pushed: Touch | None = None
         self._places: tuple[Array, ...] = ()
 
@@ -956,13 +957,14 @@ class CutSequence:
         parts, stage, push = self._parts, self._stage, contact.push
         if push is None or isinstance(stage, GivingWay):
             return None
-        why = reasons.cane_in_way(push.part, push.obstacle, float(np.linalg.norm(push.force)))
-        if not isinstance(stage, Travel | CloseUp | Advance):
+        what = push.part, push.obstacle, float(np.linalg.norm(push.force))
+        if push is self._pushed or not isinstance(stage, Travel | CloseUp | Advance):
             # The way back would lead into the canes.
             news, self._pushed = push is not self._pushed, push
             if not contact.beyond:
                 contact.gave_way(free=True)
-            return reasons.cane_on_way_out(why) if news else None
+            return reasons.cane_on_way_out(*what) if news else None
+        why = reasons.cane_in_way(*what)
         parts.gave_way += 1
         parts.next_cut.forget()
         parts.close_ups.forget(stage.point_id)
