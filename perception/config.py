@@ -31,10 +31,14 @@ class RuleConfig(Struct, frozen=True, forbid_unknown_fields=True):
         max_internode: Between kept nodes farther apart than this a node was missed (m).
         height_error: Canes whose bases differ in height by less than this cannot be ordered (m).
         min_stub: Shortest free stub between the keeper and the next cane for a renewal cut (m).
-        shears_clearance: Distance of the keeper from a renewal cut (m).
+        shears_clearance: Distance of the keeper from a renewal cut in the plane of the blades, on either side and in
+            depth (m), within `blade_half` of that plane.
+        blade_half: Half the thickness of the blades, with the radius of a cane and the error of its place (m).
+        blade_lean: Largest lean of the blades in a renewal cut (rad), that of the controller.
         crossing_distance: Distance of other canes from a cut: half the opening of the blades (m).
         max_base_gap: Longest hidden stretch at the base of a cane whose nodes can be counted (m).
-        max_diameter: Thickest wood that the shears may cut (m).
+        max_diameter: Thickest cane that the shears may cut (m).
+        max_stub_diameter: Thickest stub that the shears may cut (m).
         wire_distance: Distance of wires and hoses from a cut: 15 mm and one pixel (m).
         blade_reach: Distance of the open blades from the axis of the wood (m).
         blade_clearance: Preferred distance of a wire from the middle of each blade: that of the controller and half
@@ -62,9 +66,12 @@ class RuleConfig(Struct, frozen=True, forbid_unknown_fields=True):
     height_error: Positive = 0.004
     min_stub: Positive = 0.016
     shears_clearance: Positive = 0.022
+    blade_half: Positive = 0.006
+    blade_lean: Positive = 0.44
     max_base_gap: Positive = 0.018
     crossing_distance: Positive = 0.015
     max_diameter: Positive = 0.015
+    max_stub_diameter: Positive = 0.020
     wire_distance: Positive = 0.0165
     blade_reach: Positive = 0.021
     blade_clearance: Positive = 0.0146

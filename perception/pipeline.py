@@ -463,10 +463,12 @@ class Perception:
 
     def _update_undecided(self, number: SpurNumber, spur: Spur, decision: Decision, in_front: bool) -> None:
         causes = list(decision.undecided)
-        self._undecided.update(number, bool(decision.cuts), causes, vector3(spur.position), in_front)
+        has_cuts = any(cut.kind != "renewal cut" for cut in decision.cuts)
+        self._undecided.update(number, has_cuts, causes, vector3(spur.position), in_front)
 
     def _undecided_sites(self) -> tuple[m.UndecidedSite, ...]:
-        return self._undecided.remaining({SpurNumber(point.vine, point.spur) for point in self._tracker.points()})
+        points = (point for point in self._tracker.points() if point.kind != "renewal cut")
+        return self._undecided.remaining({SpurNumber(point.vine, point.spur) for point in points})
 
     def _apply(self, update: TrackerUpdate) -> None:
         self.withdrawn = update.withdrawn

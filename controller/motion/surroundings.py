@@ -26,8 +26,10 @@ class Surroundings:
         self._seen: Received[Obstacles] | None = None
         self._places: tuple[Array, ...] = ()
         self._canes: tuple[Capsule, ...] = ()
-        self._names: tuple[str, ...] = ()
+        self._cane_obstacles: tuple[Obstacle, ...] = ()
         self._axes = Axes(())
+        #: Canes that the blades may touch.
+        self.touchable: tuple[Obstacle, ...] = ()
 
     def update(self, obstacles: Received[Obstacles] | None) -> None:
         """Take the newest message; one that was taken before costs nothing."""
@@ -41,8 +43,8 @@ class Surroundings:
         self.model.set_obstacles(around)
         both = list(zip(obstacles.message.capsules, around, strict=True))
         self._canes = tuple(capsule for capsule, _ in both if capsule.kind == "cane")
-        canes = tuple(obstacle for capsule, obstacle in both if capsule.kind == "cane")
-        self._names, self._axes = tuple(cane.name for cane in canes), Axes(canes)
+        self._cane_obstacles = tuple(obstacle for capsule, obstacle in both if capsule.kind == "cane")
+        self._axes = Axes(self._cane_obstacles)
         self._allow()
 
     def work_at(self, places: tuple[Array, ...]) -> None:
@@ -56,7 +58,9 @@ class Surroundings:
         self._allow()
 
     def _allow(self) -> None:
-        self.model.allow({self._names[index] for index in touchable(self._canes, self._axes, self._places)})
+        found = touchable(self._canes, self._axes, self._places)
+        self.touchable = tuple(self._cane_obstacles[index] for index in sorted(found))
+        self.model.allow({cane.name for cane in self.touchable})
 
 
 def touchable(canes: Sequence[Capsule], axes: Axes, places: Sequence[Array]) -> set[int]:

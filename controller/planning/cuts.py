@@ -41,7 +41,11 @@ class CutPlanner:
         self._flows = make_method(self._robot, config.whole_body, 1.0 / config.rate_hz).flows
         self._clearance = CutClearance(RobotModel(robot_config), config.whole_body.hierarchy)
         self._search = PostureSearch(
-            RobotModel(robot_config), config.work, config.whole_body.joint_margin, self._clearance.too_near
+            RobotModel(robot_config),
+            config.work,
+            config.whole_body.joint_margin,
+            self._clearance.too_near,
+            self._clearance.tool_too_near,
         )
         self._rollout = Rollout(config, robot_config)
 
@@ -82,7 +86,7 @@ class CutPlanner:
         refused: dict[str, Reason] = {}
         for point in request.points:
             name, position, tangent = point.point_id, np.array(point.position), np.array(point.tangent)
-            found = completed(self._search.find(position, tangent, request.q, turned.get(name)))
+            found = completed(self._search.find(position, tangent, request.q, turned.get(name), point.kind))
             if isinstance(found, CutPlan):
                 cuts[name] = found
             else:

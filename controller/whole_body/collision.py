@@ -18,6 +18,7 @@ from msgspec import Struct
 
 from controller.whole_body.collision_geometry import (
     BLADES,
+    TOOL,
     Shapes,
     add_ground,
     bounding_radius,
@@ -117,6 +118,8 @@ class CollisionModel:
         self._allowed = (frozenset[str](), frozenset[str]())
         self._build(_SLOTS)
         self.set_obstacles(())
+        self._tool_rows = np.flatnonzero([part in TOOL for part in self._parts])
+        self._tool_ends, self._tool_radii = self._tool_capsules()
 
     @property
     def self_pairs(self) -> tuple[Pair, ...]:
@@ -187,6 +190,24 @@ class CollisionModel:
             np.array([result.getNearestPoint2() for result in results]).reshape(-1, 3),
         )
 
+    def tool_distances(self, T_odom_tool: Any, within: float) -> tuple[Array, tuple[Pair, ...]]:
+        """Distances of the tool's parts from the obstacles with the tool at a pose, whatever the posture of the arm.
+
+        Args:
+            T_odom_tool: Pose of the tool (pin.SE3).
+            within: Farther pairs do not count (m).
+
+        Returns:
+            Distances (k, m) and names of both sides (k).
+        """
+        ends = self._tool_ends @ T_odom_tool.rotation.T + T_odom_tool.translation
+        gaps = self._axes.capsule_gaps(ends[0], ends[1], self._tool_radii)
+        if self._ignores:
+            gaps[self._ignored[self._tool_rows]] = np.inf
+        near = np.argwhere(gaps < within)
+        pairs = [(self._parts[self._tool_rows[part]], self._obstacles[at].name) for part, at in near.tolist()]
+        return gaps[near[:, 0], near[:, 1]], tuple(pairs)
+
     def least(self, q: Array) -> Clearance:
         """Smallest distance of all monitored pairs at q (12)."""
         self._place(q)
@@ -232,6 +253,15 @@ class CollisionModel:
         closest = int(distance.argmin())
         self.nearest = Clearance(float(distance[closest]), self._pair(near[closest]))
         return Dampers(jacobian, distance, tuple([self._pair(p) for p in near]))
+
+    def _tool_capsules(self) -> tuple[Array, Array]:
+        """Ends of the capsules of the tool's parts in its own frame (2×t×3, m), and their radii (t, m)."""
+        q, shapes = np.zeros(NQ), self.shapes
+        placed = self.placed(q)[self._tool_rows]
+        T_odom_tool = self._robot.pose(q, self._robot.tool_id)
+        half = placed[:, 2:9:3] * shapes.half[self._tool_rows, 2:]
+        ends = np.stack([placed[:, 9:] - half, placed[:, 9:] + half]) - T_odom_tool.translation
+        return ends @ T_odom_tool.rotation, shapes.around[self._tool_rows]
 
     def _place(self, q: Array) -> None:
         robot = self._robot

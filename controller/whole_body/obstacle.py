@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller.whole_body.compiled import MATRIX, NOTHING, PACKED, VECTOR, compiled
+from controller.whole_body.compiled import MATRIX, NOTHING, NUMBER, PACKED, VECTOR, compiled
 from rolling_panda.errors import InputError
 from rolling_panda.model.differential_drive import Array
 
@@ -61,6 +61,12 @@ class Axes:
         _gaps(centers, radii, self._start, self._along, self._inverse, self._radius, gaps)
         return gaps
 
+    def capsule_gaps(self, first: Array, last: Array, radii: Array) -> Array:
+        """Gaps (g×n, m) between g capsules with these ends (each g×3) and radii (g), and the n obstacles."""
+        gaps = np.empty((len(radii), len(self._start)))
+        _capsule_gaps(first, last, radii, self._start, self._along, self._radius, gaps)
+        return gaps
+
 
 @compiled(NOTHING(MATRIX, VECTOR, PACKED, PACKED, VECTOR, VECTOR, PACKED))
 def _gaps(centers: Array, radii: Array, start: Array, along: Array, inverse: Array, radius: Array, gaps: Array) -> None:
@@ -71,4 +77,39 @@ def _gaps(centers: Array, radii: Array, start: Array, along: Array, inverse: Arr
             t = (x * along[n, 0] + y * along[n, 1] + z * along[n, 2]) * inverse[n]
             t = min(max(t, 0.0), 1.0)
             x, y, z = x - t * along[n, 0], y - t * along[n, 1], z - t * along[n, 2]
+            gaps[g, n] = math.sqrt(x * x + y * y + z * z) - radii[g] - radius[n]
+
+
+@compiled(NUMBER(NUMBER))
+def _share(value: float) -> float:
+    """The nearest number in 0…1."""
+    return min(max(value, 0.0), 1.0)
+
+
+@compiled(NOTHING(PACKED, PACKED, VECTOR, PACKED, PACKED, VECTOR, PACKED))
+def _capsule_gaps(
+    first: Array, last: Array, radii: Array, start: Array, along: Array, radius: Array, gaps: Array
+) -> None:
+    """Write the distances of line segments less both radii (Ericson, Real-Time Collision Detection, 5.1.9)."""
+    for g in range(len(radii)):
+        for n in range(len(radius)):
+            u0, u1, u2 = last[g, 0] - first[g, 0], last[g, 1] - first[g, 1], last[g, 2] - first[g, 2]
+            v0, v1, v2 = along[n, 0], along[n, 1], along[n, 2]
+            w0, w1, w2 = first[g, 0] - start[n, 0], first[g, 1] - start[n, 1], first[g, 2] - start[n, 2]
+            uu, vv, uv = u0 * u0 + u1 * u1 + u2 * u2, v0 * v0 + v1 * v1 + v2 * v2, u0 * v0 + u1 * v1 + u2 * v2
+            uw, vw = u0 * w0 + u1 * w1 + u2 * w2, v0 * w0 + v1 * w1 + v2 * w2
+            s, t = 0.0, 0.0
+            if uu > _POINT and vv > _POINT:
+                across = uu * vv - uv * uv
+                s = _share((uv * vw - uw * vv) / across) if across > _POINT * uu * vv else 0.0
+                t = (uv * s + vw) / vv
+                if t < 0.0:
+                    t, s = 0.0, _share(-uw / uu)
+                elif t > 1.0:
+                    t, s = 1.0, _share((uv - uw) / uu)
+            elif uu > _POINT:
+                s = _share(-uw / uu)
+            elif vv > _POINT:
+                t = _share(vw / vv)
+            x, y, z = w0 + s * u0 - t * v0, w1 + s * u1 - t * v1, w2 + s * u2 - t * v2
             gaps[g, n] = math.sqrt(x * x + y * y + z * z) - radii[g] - radius[n]

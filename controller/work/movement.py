@@ -86,7 +86,11 @@ class Movement:
         self._saturation, self._setpoints = body.saturation, body.setpoints
         self._clearance = CutClearance(RobotModel(robot_config), config.whole_body.hierarchy)
         search = PostureSearch(
-            RobotModel(robot_config), config.work, config.whole_body.joint_margin, self._clearance.too_near
+            RobotModel(robot_config),
+            config.work,
+            config.whole_body.joint_margin,
+            self._clearance.too_near,
+            self._clearance.tool_too_near,
         )
         self.sequence = CutSequence(
             config, search, body.follower, body.saturation, queue, run_id, known, permit, planned_from

@@ -224,9 +224,10 @@ class PointQueue:
             return reasons.point_revised(point_id, revision, ticket.point.revision)
         if digest and digest != ticket.point.digest:
             return reasons.point_replaced(point_id, ticket.point.digest[:8] or "unknown", digest[:8])
-        radius = ticket.point.radius
-        if radius > self._config.largest_radius:
-            return reasons.cane_too_thick(point_id, 2e3 * radius, 2e3 * self._config.largest_radius)
+        radius, stub = ticket.point.radius, ticket.point.kind == "renewal cut"
+        largest = self._config.largest_stub_radius if stub else self._config.largest_radius
+        if radius > largest:
+            return reasons.cane_too_thick(point_id, 2e3 * radius, 2e3 * largest)
         return None
 
     def none_acceptable(self, confidence: float = 0.0) -> Reason | None:

@@ -7,8 +7,11 @@ The blade plane is square to the cane, and the approach is from the side of the 
 The search is a generator that yields after each iteration, so that a control period runs a few iterations only.
 """
 
-from collections.abc import Callable, Generator
+import math
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
+from functools import cache
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -16,12 +19,13 @@ import pinocchio as pin
 
 from controller.config import HierarchyConfig, WorkConfig
 from controller.motion.surroundings import Surroundings
-from controller.whole_body.collision import CollisionModel
+from controller.whole_body.collision import CollisionModel, Pair
+from controller.whole_body.collision_geometry import BLADES
 from controller.work.point_queue import PointQueue, Ticket
 from rolling_panda import reasons
 from rolling_panda.errors import InputError
 from rolling_panda.messages.perception import Obstacles, PruningPoint
-from rolling_panda.messages.types import Reason
+from rolling_panda.messages.types import CutKind, Reason
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.map_frame import MapFrame
 from rolling_panda.model.robot import ARM_Q, RobotModel
@@ -48,6 +52,7 @@ def cut_poses(
     clearance: float,
     azimuth: float = 0.0,
     tilt: float = 0.0,
+    lean: float = 0.0,
 ) -> CutPoses:
     """The poses of a cut.
 
@@ -59,6 +64,7 @@ def cut_poses(
         clearance: Distance back where the tool is clear of the canes (m).
         azimuth: Turn of the approach about the cane (rad); 0 is closest to `towards_row`.
         tilt: Turn of the tool out of the plane square to the cane (rad); positive comes from below.
+        lean: Turn of the blades about the approach (rad).
 
     Raises:
         InputError: The cane points at the robot, so that no approach is square to it.
@@ -76,6 +82,8 @@ def cut_poses(
     if tilt:
         rotation = pin.exp3(side * tilt) @ rotation
         approach = rotation[:, 2]
+    if lean:
+        rotation = pin.exp3(approach * lean) @ rotation
 
     def back(distance: float) -> Any:
         return pin.SE3(rotation, position - distance * approach)
@@ -107,22 +115,27 @@ def escape_pose(config: WorkConfig, T_odom_tool: Any, frame: MapFrame, deeper: f
 
 #: Positions of the cut ahead of the axle (m), in order of preference.
 OFFSETS = (0.15, 0.05, 0.25, -0.05, 0.35, -0.15, 0.45)
-#: Approaches in order of preference: turn about the cane and tilt out of the plane square to it (rad). A cut may lean
-#: by 15° (spur-pruning practice); coming from below brings high points into reach, and either way passes a wire.
-APPROACHES = (
-    (0.0, 0.0),
-    (0.0, 0.2),
-    (0.0, 0.26),
-    (0.0, -0.26),
-    (0.35, 0.0),
-    (-0.35, 0.0),
-    (0.35, 0.2),
-    (-0.35, 0.2),
-    (0.7, 0.0),
-    (-0.7, 0.0),
+#: Turn about the cane, tilt out of the plane square to it, and lean of the blades about the approach (rad).
+Approach = tuple[float, float, float]
+#: Approaches in order of preference. A cut may lean by 15° (spur-pruning practice); coming from below brings high
+#: points into reach, and either way passes a wire.
+APPROACHES: tuple[Approach, ...] = (
+    (0.0, 0.0, 0.0),
+    (0.0, 0.2, 0.0),
+    (0.0, 0.26, 0.0),
+    (0.0, -0.26, 0.0),
+    (0.35, 0.0, 0.0),
+    (-0.35, 0.0, 0.0),
+    (0.35, 0.2, 0.0),
+    (-0.35, 0.2, 0.0),
+    (0.7, 0.0, 0.0),
+    (-0.7, 0.0, 0.0),
 )
 #: Tilts for an azimuth set by a person (rad), in order of preference.
 TILTS = (0.0, 0.2, 0.26, -0.26)
+#: Where none of these has room: turns, tilts and leans in all combinations, the smallest first. On a stub the blades
+#: lean more, as a person's shears do, to pass the cane that stays.
+_TURNS, _TILTS, _LEANS, _STUB_LEANS = (0.0, 0.35, 0.7), (0.0, 0.13, 0.26), (0.0, 0.13, 0.26), (0.0, 0.15, 0.3, 0.44)
 #: Largest distance from the arm's shoulder to its wrist, with elbow and wrist offsets (m, Panda), and from the
 #: wrist to the flange (m).
 _ARM_LENGTH, _WRIST_TO_FLANGE = 0.3266 + 0.3928 + 0.088, 0.107
@@ -131,6 +144,25 @@ _GOOD_MARGIN, _GOOD_OMEGA = 0.25, 0.035
 _LEAST_MARGIN, _LEAST_OMEGA = 0.08, 0.012
 _ITERATIONS, _LARGEST_STEP, _PULL = 45, 0.25, 0.02
 _DAMPING = np.eye(6) * 1e-4
+
+
+@cache
+def approaches(azimuth: float | None, kind: CutKind) -> tuple[Approach, ...]:
+    """All approaches in the order in which they are tried.
+
+    Args:
+        azimuth: Turn about the cane set by a person; None leaves it to the search.
+        kind: What the cut is for.
+    """
+    usual = APPROACHES if azimuth is None else tuple((azimuth, tilt, 0.0) for tilt in TILTS)
+    turns = _both(_TURNS) if azimuth is None else (azimuth,)
+    leans = _both(_STUB_LEANS if kind == "renewal cut" else _LEANS)
+    more = sorted(product(turns, _both(_TILTS), leans), key=lambda each: abs(each[0]) / 2 + abs(each[1]) + abs(each[2]))
+    return usual + tuple(each for each in more if each not in usual)
+
+
+def _both(sizes: tuple[float, ...]) -> tuple[float, ...]:
+    return tuple(sorted({sign * size for size in sizes for sign in (1.0, -1.0)}))
 
 
 @dataclass(frozen=True)
@@ -185,6 +217,7 @@ class PostureSearch:
         config: WorkConfig,
         joint_margin: float,
         too_near: Callable[[CutPlan], tuple[float, Reason | None]] = lambda _: (0.0, None),
+        tool_too_near: Callable[[CutPoses, CutKind], tuple[float, Reason | None]] = lambda *_: (0.0, None),
     ) -> None:
         """Remember the model and the row's direction.
 
@@ -194,8 +227,9 @@ class PostureSearch:
             joint_margin: Distance from every joint limit (rad).
             too_near: How much of a required distance a plan lacks (m), with its place and parts; None if it lacks none.
                 Another plan is not returned.
+            tool_too_near: The same for the tool alone at the poses of a cut of a kind, where no posture helps.
         """
-        self._robot, self._config, self._too_near = robot, config, too_near
+        self._robot, self._config, self._too_near, self._tool_too_near = robot, config, too_near, tool_too_near
         c, s = np.cos(config.row_heading), np.sin(config.row_heading)
         self._along, self._left = np.array([c, s, 0.0]), np.array([-s, c, 0.0])
         self._base_id = robot.frame_id("base_link")
@@ -209,7 +243,12 @@ class PostureSearch:
         self._upper = robot.limits.upper[ARM_Q] - margin
 
     def find(
-        self, position: Array, tangent: Array, q: Array, azimuth: float | None = None
+        self,
+        position: Array,
+        tangent: Array,
+        q: Array,
+        azimuth: float | None = None,
+        kind: CutKind = "spur cut",
     ) -> Generator[None, None, CutPlan | Unreachable]:
         """Search, yielding once an iteration.
 
@@ -218,6 +257,7 @@ class PostureSearch:
             tangent: Unit vector along the cane (3, map).
             q: Current configuration (12): the base keeps its distance to the row.
             azimuth: Turn of the approach about the cane (rad) set by a person; None leaves it to the search.
+            kind: What the cut is for.
         """
         best: CutPlan | None = None
         passed_over: list[tuple[float, Reason]] = []
@@ -225,12 +265,20 @@ class PostureSearch:
         base = np.array([q[0], q[1], 0.0])
         lateral = float(base @ self._left)
         config = self._config
-        approaches = APPROACHES if azimuth is None else tuple((azimuth, tilt) for tilt in TILTS)
-        for turn, tilt in approaches:
+        usual = len(APPROACHES if azimuth is None else TILTS)
+        for tried, approach in enumerate(approaches(azimuth, kind)):
+            # More approaches help where something is in the way, not where the arm does not get there.
+            if tried == usual and not passed_over:
+                break
             try:
-                poses = cut_poses(position, tangent, self._left, config.stand_off, config.clearance, turn, tilt)
+                poses = cut_poses(position, tangent, self._left, config.stand_off, config.clearance, *approach)
             except InputError:
                 return Unreachable(reasons.no_square_approach())
+            lacking, nearest = self._tool_too_near(poses, kind)
+            if nearest is not None:
+                passed_over.append((lacking, nearest))
+                yield
+                continue
             for offset in OFFSETS:
                 place = (float(position @ self._along) - offset) * self._along + lateral * self._left
                 start = q.copy()
@@ -325,6 +373,13 @@ def completed(search: Generator[None, None, CutPlan | Unreachable]) -> CutPlan |
 CLEARANCE = 0.02
 #: Margin above the smallest distance of the guard (m): close to it the robot is very slow.
 _ROOM = 0.003
+#: By so much a posture may miss a pose (m).
+_INEXACT = 0.0005
+#: A cane that stays is between the closing blades where its axis comes into a box around the middle of a cut, with
+#: these half sizes along the tool's axes: opening, thickness and reach of the blades with a margin (m).
+_BITE = np.array([0.020, 0.004, 0.022])
+#: What is known of a cane begins at the bark of its stub, up to so far from the stub's axis (m).
+_HIDDEN = 0.020
 
 
 class CutClearance:
@@ -334,6 +389,7 @@ class CutClearance:
         """Nothing is known to stand around yet."""
         self._settings = settings
         self._surroundings = Surroundings(CollisionModel(robot))
+        self._within = max(settings.collision_distance + _ROOM, CLEARANCE)
 
     def update(self, obstacles: Received[Obstacles] | None) -> None:
         """Take the newest message; one that was taken before costs nothing."""
@@ -344,28 +400,89 @@ class CutClearance:
 
         Places: at the cut, at the stand-off and clear of the canes. The blades may touch the spur that is cut.
         """
-        settings = self._settings
-        if not settings.collisions:
+        if not self._settings.collisions:
             return 0.0, None
         self._surroundings.work_at((plan.poses.cut.translation,))
-        within = max(settings.collision_distance + _ROOM, CLEARANCE)
-        worst, found = 0.0, None
+        found: list[tuple[float, Reason | None]] = [(0.0, None)]
         places: tuple[tuple[reasons.Place, Array], ...] = (
             ("at the cut", plan.q_cut),
             ("at the stand-off", plan.q_stand_off),
             ("clear of it", plan.q_clear),
         )
         for where, q in places:
-            near = self._surroundings.model.distances(q, within)
-            for distance, pair in zip(near.distance.tolist(), near.pairs, strict=True):
-                needed = settings.kept(pair) + _ROOM
-                if q is plan.q_clear:
-                    # The motion to the next cut begins and ends here.
-                    needed = max(needed, CLEARANCE)
-                if needed - distance > worst:
-                    worst = needed - distance
-                    found = reasons.too_near(where, 1e3 * distance, *pair, 1e3 * needed)
+            near = self._surroundings.model.distances(q, self._within)
+            found.append(self._lacking(where, near.distance, near.pairs))
+        return max(found, key=lambda each: each[0])
+
+    def tool_too_near(self, poses: CutPoses, kind: CutKind) -> tuple[float, Reason | None]:
+        """The same of the tool alone, which no posture of the arm changes.
+
+        Beside a cut on a stub, a cane that stays must not be between the blades either.
+
+        Args:
+            poses: Of the tool.
+            kind: What the cut is for.
+        """
+        if not self._settings.collisions:
+            return 0.0, None
+        self._surroundings.work_at((poses.cut.translation,))
+        found: list[tuple[float, Reason | None]] = [(0.0, None)]
+        if kind == "renewal cut":
+            found.append(self._bitten(poses.cut))
+        places: tuple[tuple[reasons.Place, Any], ...] = (
+            ("at the cut", poses.cut),
+            ("at the stand-off", poses.stand_off),
+            ("clear of it", poses.clear),
+        )
+        for where, pose in places:
+            found.append(self._lacking(where, *self._surroundings.model.tool_distances(pose, self._within), _INEXACT))
+        return max(found, key=lambda each: each[0])
+
+    def _lacking(
+        self, where: reasons.Place, distances: Array, pairs: Sequence[Pair], inexact: float = 0.0
+    ) -> tuple[float, Reason | None]:
+        """Largest violation of a required distance at one place; `inexact` is forgiven (m)."""
+        worst, found = 0.0, None
+        for distance, pair in zip(distances.tolist(), pairs, strict=True):
+            needed = self._settings.kept(pair) + _ROOM
+            if where == "clear of it":
+                # The motion to the next cut begins and ends here.
+                needed = max(needed, CLEARANCE)
+            if needed - inexact - distance > worst:
+                worst = needed - inexact - distance
+                found = reasons.too_near(where, 1e3 * distance, *pair, 1e3 * needed)
         return worst, found
+
+    def _bitten(self, T_map_tool: Any) -> tuple[float, Reason | None]:
+        """A cane that the blades may touch, but would cut as well: how far it is in (m), and the reason."""
+        worst, found = 0.0, None
+        canes = self._surroundings.touchable
+        joints = {cane.end for cane in canes}
+        for cane in canes:
+            start, end = np.array(cane.start), np.array(cane.end)
+            if cane.start not in joints:
+                start = start - _HIDDEN * (end - start) / max(float(np.linalg.norm(end - start)), 1e-9)
+            inside, away = _in_box((np.array([start, end]) - T_map_tool.translation) @ T_map_tool.rotation)
+            if inside > worst:
+                near = reasons.too_near("at the cut", 1e3 * away, BLADES, cane.name, 1e3 * (away + inside))
+                worst, found = inside, near
+        return worst, found
+
+
+def _in_box(ends: Array) -> tuple[float, float]:
+    """How far a line segment (2×3, in the tool's frame) is in the box of the closing blades, and from its middle (m).
+
+    Zero and infinity where it does not come into it.
+    """
+    along = np.where(np.abs(ends[1] - ends[0]) < 1e-9, 1e-9, ends[1] - ends[0])
+    first, second = (-_BITE - ends[0]) / along, (_BITE - ends[0]) / along
+    low, high = max(float(np.minimum(first, second).max()), 0.0), min(float(np.maximum(first, second).min()), 1.0)
+    if low >= high:
+        return 0.0, math.inf
+    places = ends[0] + np.linspace(low, high, 9)[:, None] * along
+    inside = np.minimum(_BITE[0] - np.abs(places[:, 0]), _BITE[2] - np.abs(places[:, 2]))
+    deepest = int(np.argmax(inside))
+    return float(inside[deepest]), float(np.hypot(places[deepest, 0], places[deepest, 2]))
 
 
 Found = CutPlan | Unreachable | None
@@ -432,7 +549,7 @@ class NextCut:
                 return True
             at, along = np.array(ticket.accepted.position), np.array(ticket.accepted.tangent)
             azimuth = self._queue.approaches.of(ticket.point.point_id)
-            self._finding = self._search.find(at, along, q, azimuth)
+            self._finding = self._search.find(at, along, q, azimuth, ticket.accepted.kind)
         return True
 
     @property

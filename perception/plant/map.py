@@ -150,12 +150,26 @@ class KnownCane:
 
 @dataclass
 class KnownSpur:
-    """A spur over all observations: its position (3, m, odom), its most complete observation and its canes."""
+    """A spur over all observations: its position (3, m, odom), its most complete observation, its canes and its stub.
+
+    Attributes:
+        stubs: Newest measurements of the stub, from the cordon outwards: both ends (m, odom) and radius (m), 7 each.
+    """
 
     number: SpurNumber
     position: Estimate
     best: Spur
     canes: list[KnownCane] = field(default_factory=list)
+    stubs: deque[Array] = field(default_factory=lambda: deque(maxlen=_WINDOW))
+
+    def with_median_stub(self, spur: Spur) -> Spur:
+        """An observation of it, which is added, with the median stub of all: single ones may include wood beside it."""
+        if spur.axis is not None and spur.radius > 0.0:
+            self.stubs.append(np.array([*spur.axis.ravel(), spur.radius]))
+        if not self.stubs:
+            return spur
+        median = np.median(self.stubs, axis=0)
+        return replace(spur, axis=median[:6].reshape(2, 3), radius=float(median[6]))
 
     def as_spur(self) -> Spur:
         """The best observation with the mapped canes that at least half of the observations have shown."""
@@ -193,7 +207,7 @@ class PlantMap:
         self._spurs: dict[SpurNumber, KnownSpur] = {}
 
     def update(self, plant: Plant, numbers: tuple[SpurNumber, ...]) -> tuple[Spur, ...]:
-        """Add the plant of one frame; returns its spurs with the median radius of each cane.
+        """Add the plant of one frame; returns its spurs with the median stub, and with the median radius of each cane.
 
         Args:
             plant: Plant of one frame.
@@ -209,7 +223,7 @@ class PlantMap:
                 if not spur.incomplete and (known.best.incomplete or len(spur.canes) > len(known.best.canes)):
                     known.best = spur
             canes = tuple(_associate(known, cane).with_median_radius(cane) for cane in spur.canes)
-            out.append(replace(spur, canes=canes))
+            out.append(replace(known.with_median_stub(spur), canes=canes))
         return tuple(out)
 
     def sever(self, position: Array) -> bool:

@@ -107,7 +107,7 @@ class UndecidedSites:
 
         Args:
             number: Of the spur.
-            has_cuts: Whether cuts are proposed there as well.
+            has_cuts: Whether cuts of canes are proposed there as well.
             causes: Why it is undecided; an empty list closes the site.
             position: Of the spur (m, odom).
             in_front: Whether the camera is in front of it. Other views do not overrule one from the front.
@@ -122,7 +122,7 @@ class UndecidedSites:
             self._sites[number] = _Site(has_cuts, messages, in_front)
 
     def remaining(self, with_points: set[SpurNumber]) -> tuple[m.UndecidedSite, ...]:
-        """All reasons in order of the spurs; those without a cut are omitted for spurs with a published point."""
+        """All reasons in order of the spurs; those without a cut are omitted for spurs where a cane has a point."""
         return tuple(
             self._with_need(each, number)
             for number, site in sorted(self._sites.items())

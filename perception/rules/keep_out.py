@@ -14,7 +14,7 @@ from rolling_panda.messages.perception import Capsule
 from rolling_panda.messages.types import Reason
 
 #: Approximate approach direction: the row runs along x of odom and the robot stands beside it.
-_APPROACH = np.array([0.0, 1.0, 0.0])
+APPROACH = np.array([0.0, 1.0, 0.0])
 #: Depth in front of the cut (m) that the tool passes through, since the camera looks along the approach.
 _IN_FRONT = 0.15
 #: Depth behind the cut (m) that the blades reach.
@@ -72,7 +72,7 @@ def map_keep_out(obstacles: tuple[Capsule, ...], rule: RuleConfig) -> KeepOut:
         return _wire_reason(rule) if near else wood_reason(position)
 
     def fits(position: Array, tangent: Array) -> bool:
-        side = np.cross(tangent, _APPROACH)
+        side = np.cross(tangent, APPROACH)
         side *= rule.blade_reach / max(float(np.linalg.norm(side)), 1e-9)
         blades = np.stack([position - side, position, position + side])
         return bool(np.all(wires.nearest(blades) >= rule.blade_clearance))

@@ -18,7 +18,7 @@ from msgspec.structs import replace
 from perception.arrays import Array, distance
 from perception.config import RuleConfig
 from perception.plant.model import Cane, Node, Spur
-from perception.rules.keep_out import NO_KEEP_OUT, KeepOut
+from perception.rules.keep_out import APPROACH, NO_KEEP_OUT, KeepOut
 from rolling_panda import reasons
 from rolling_panda.messages.types import CutKind, Reason
 
@@ -28,6 +28,15 @@ from rolling_panda.messages.types import CutKind, Reason
 CUTTING_STRENGTH = 9.34e6
 #: Half the length of wood around a cut that must be visible (m).
 _VISIBLE_HALF_WIDTH = 0.008
+#: Confidence of a renewal cut beside a cane whose own cut is undecided: never one that is accepted unseen.
+_DOUBTFUL = 0.5
+#: Leans of the blades in a renewal cut, as shares of the largest.
+_LEANS = (0.0, 1 / 3, -1 / 3, 2 / 3, -2 / 3, 1.0, -1.0)
+#: Places of a renewal cut between the cane that stays and the next one, by shares of the way, in order of preference.
+_STUB_SHARES = (0.5, 0.65, 0.8)
+#: Length of a cane that gives its direction at the base (m), least sine of its angle to the stub, and most that the
+#: stub hides of its axis (m).
+_BASE, _LEAST_SINE, _THICK = 0.025, 0.2, 0.015
 #: The Guyot rule never proposes the removal of last year's cane: its head is not visible from the front.
 _OLD_CANE: Final = reasons.old_cane_left()
 
@@ -112,11 +121,12 @@ def _prune_spur(spur: Spur, config: RuleConfig, others: list[Array], keep_out: K
         return Decision(undecided=(keeper,))
     wood = [cane.axis for cane in spur.canes if cane is not keeper.cane] + others
     shorten = _shorten(keeper, wood, config, keep_out)
-    if isinstance(shorten, Reason):
-        return Decision(undecided=(shorten,))
     if len(spur.canes) == 1:
-        return Decision(cuts=(shorten,))
+        return Decision(undecided=(shorten,)) if isinstance(shorten, Reason) else Decision(cuts=(shorten,))
+    # Which cane stays is known, wherever it will be cut: it may be pruned already, or hide a node.
     renew = _renew(spur, keeper, shorten, config, keep_out)
+    if isinstance(shorten, Reason):
+        return Decision(cuts=() if isinstance(renew, Reason) else (renew,), undecided=(shorten,))
     if isinstance(renew, Reason):
         return Decision(cuts=(shorten,), undecided=(renew,))
     return Decision(cuts=(shorten, renew))
@@ -262,7 +272,7 @@ def clear_arc(cane: Cane, arc: float, others: list[Array], config: RuleConfig, k
 
 
 def too_thick(radius: float, config: RuleConfig) -> bool:
-    """Whether wood of a radius (m) cannot be cut."""
+    """Whether a cane of a radius (m) cannot be cut."""
     return 2 * radius > config.max_diameter
 
 
@@ -320,40 +330,94 @@ def cut_confidence(cane: Cane, arc: float, choice: float, config: RuleConfig) ->
     return float(np.clip(seen * min(1.0, 0.6 + pixels / 50.0) * choice, 0.0, 1.0))
 
 
-def _renew(spur: Spur, keeper: _Keeper, shorten: Cut, config: RuleConfig, keep_out: KeepOut) -> Cut | Reason:
+def _renew(spur: Spur, keeper: _Keeper, shorten: Cut | Reason, config: RuleConfig, keep_out: KeepOut) -> Cut | Reason:
     others = [cane for cane in spur.canes if cane is not keeper.cane]
 
     def left(why: Reason) -> Reason:
         return reasons.other_cane_left(why) if len(others) == 1 else reasons.other_canes_left(len(others), why)
 
+    if keeper.cane.base_gap > config.max_base_gap:
+        return left(reasons.cane_base_hidden())
     if spur.axis is None or spur.radius <= 0.0:
         return left(reasons.stub_unclear())
     root, tip = spur.axis
     length = distance(tip, root)
     along = (tip - root) / length
-    keeper_at = float((keeper.cane.base - root) @ along)
-    nearest = min(float((cane.base - root) @ along) for cane in others)
-    if nearest < keeper_at:
+    keeper_at, keeper_seen = _origin(keeper.cane, root, along)
+    found = [_origin(cane, root, along) for cane in others]
+    nearest, nearest_seen = (min(values) for values in zip(*found, strict=True))
+    if nearest < keeper_at or nearest_seen < keeper_seen:
         return left(reasons.cane_below_keeper())
     room = min(nearest, length) - keeper_at
-    if room < config.min_stub:
-        return left(reasons.stub_too_short(1000 * max(room, 0.0)))
-    position = root + (keeper_at + room / 2) * along
-    if float(np.linalg.norm(keeper.cane.axis - position, axis=1).min()) < config.shears_clearance:
+    shortest = min(room, min(nearest_seen, length) - keeper_seen)
+    if shortest < config.min_stub:
+        return left(reasons.stub_too_short(1000 * max(shortest, 0.0)))
+    places = (root + (keeper_at + share * room) * along for share in _STUB_SHARES)
+    hidden = np.linspace(root + keeper_at * along, keeper.cane.base, 5)
+    axis = np.concatenate([hidden, keeper.cane.axis])
+    passed = (place for place in places if _blades_pass(axis, place, along, config))
+    position = next(passed, None)
+    if position is None:
         return left(reasons.shears_touch_keeper())
     if (reason := keep_out.reason(position)) is not None:
         return left(reason)
-    if too_thick(spur.radius, config):
+    if 2 * spur.radius > config.max_stub_diameter:
         return left(reasons.stub_beyond_shears(2000 * spur.radius))
     return Cut(
         kind="renewal cut",
         position=position,
         tangent=along,
         radius=spur.radius,
-        confidence=0.8 * shorten.confidence,
-        nodes_seen=shorten.nodes_seen,
-        nodes_kept=shorten.nodes_kept,
+        confidence=0.8 * shorten.confidence if isinstance(shorten, Cut) else _DOUBTFUL * keeper.certainty,
+        nodes_seen=len(count_nodes(keeper.cane, config)),
+        nodes_kept=config.nodes_kept,
         reason=reasons.renewal_cut(len(others)),
         node_distance=node_distance(keeper.cane, keeper.cane.nodes, position),
         cane=keeper.cane.number,
     )
+
+
+def _origin(cane: Cane, root: Array, along: Array) -> tuple[float, float]:
+    """Where the axis of a cane comes out of that of its stub, and where it begins to be seen, from the stub's root (m).
+
+    What is seen of a cane begins at the bark of the stub: where it leaves at an angle, farther out than its axis.
+
+    Args:
+        cane: The cane.
+        root: Of the stub (3, m, odom).
+        along: Unit vector along the stub (3, odom).
+    """
+    off = cane.base - root
+    seen = float(off @ along)
+    direction = cane.at(float(cane.arc[0]) + _BASE) - cane.base
+    forward = float(direction @ along)
+    across = direction - forward * along
+    square = float(across @ across)
+    if square < (_LEAST_SINE * np.linalg.norm(direction)) ** 2:
+        return seen, seen
+    # Back along the cane until it is nearest to the axis of the stub.
+    back = max(float((off - seen * along) @ across) / square, 0.0)
+    return seen - min(back * forward, _THICK), seen
+
+
+def _blades_pass(keeper: Array, position: Array, along: Array, config: RuleConfig) -> bool:
+    """Whether the blades, leaned as far as they may, pass the cane that stays beside a cut through its stub.
+
+    Args:
+        keeper: Axis of the cane that stays, from that of the stub (N×3, m, odom).
+        position: Of the cut (3, m, odom).
+        along: Unit vector along the stub (3, odom).
+        config: Clearances and largest lean.
+    """
+    depth = APPROACH - float(APPROACH @ along) * along
+    depth = depth / max(float(np.linalg.norm(depth)), 1e-9)
+    side = np.cross(along, depth)
+    off = keeper - position
+    deep = np.abs(off @ depth) < config.shears_clearance
+    for share in _LEANS:
+        lean = share * config.blade_lean
+        height = off @ (np.cos(lean) * along + np.sin(lean) * side)
+        beside = off @ (np.cos(lean) * side - np.sin(lean) * along)
+        if not np.any(deep & (np.abs(height) < config.blade_half) & (np.abs(beside) < config.shears_clearance)):
+            return True
+    return False

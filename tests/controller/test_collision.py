@@ -66,6 +66,26 @@ def test_tool_hanging_beside_the_base_meets_the_ground():
     assert found["blades", "ground"] == pytest.approx(lowest, abs=0.03)
 
 
+@settings(max_examples=30)
+@given(seeds)
+def test_the_tools_distances_need_no_posture(seed):
+    rng = np.random.default_rng(seed)
+    q = anywhere(rng)
+    tool = ROBOT.pose(q, ROBOT.tool_id).copy()
+    MODEL.set_obstacles(canes(rng, 12, tuple(tool.translation), 0.2))
+    MODEL.allow({"cane 3"})
+    every = {pair: away for pair, away in by_pair(MODEL.distances(q, 0.2)).items() if pair[1].startswith("cane ")}
+    distances, pairs = MODEL.tool_distances(tool, 0.2)
+    found = {}
+    for distance, pair in zip(distances.tolist(), pairs, strict=True):
+        found[pair] = min(found.get(pair, np.inf), distance)
+    expected = {pair: away for pair, away in every.items() if pair[0] in ("blades", "cutter", "camera")}
+    MODEL.allow(())
+    assert found.keys() == expected.keys() and ("blades", "cane 3") not in found
+    for pair, away in expected.items():
+        assert found[pair] == pytest.approx(away, abs=1e-6 if away > 0.0 else 0.02)
+
+
 @settings(max_examples=60)
 @given(seeds)
 def test_distance_changes_as_the_dampers_say(seed):

@@ -21,15 +21,16 @@ def wire(height, y=0.75):
     return Capsule("wire", (-0.2, y, height), (2.0, y, height), 0.004, 0.004)
 
 
-def find(*capsules):
+def find(*capsules, tangent=(0.0, 0.1, 1.0), azimuth=None, kind="spur cut"):
     """A plan for the point, among these."""
     clearance = CutClearance(RobotModel(), CONFIG.whole_body.hierarchy)
     message = Obstacles(header=m.Header(0.0, "odom"), capsules=capsules)
     clearance.update(Received(message, 0.0))
     q = np.zeros(12)
     q[ARM_Q] = CONFIG.work.home
-    search = PostureSearch(RobotModel(), CONFIG.work, CONFIG.whole_body.joint_margin, clearance.too_near)
-    return completed(search.find(POINT, np.array([0.0, 0.1, 1.0]), q))
+    checks = clearance.too_near, clearance.tool_too_near
+    search = PostureSearch(RobotModel(), CONFIG.work, CONFIG.whole_body.joint_margin, *checks)
+    return completed(search.find(POINT, np.array(tangent), q, azimuth, kind))
 
 
 def nearest(plan, capsule):
@@ -49,6 +50,67 @@ def test_a_wire_over_the_cut_is_passed_from_below():
     assert nearest(free, over) < SETTINGS.cutter_distance < nearest(beside, over)
     assert beside.poses.cut.rotation[2, 2] > free.poses.cut.rotation[2, 2] + 0.1
     np.testing.assert_allclose(beside.poses.cut.translation, POINT)
+
+
+def test_beside_a_leaning_cane_the_blades_lean_away_from_a_wire():
+    """Square to the cane one of the blades would come too near, from wherever the tool comes."""
+    leaning = (0.3, 0.0, 1.0)
+    free, beside = find(tangent=leaning), find(wire(POINT[2] + 0.0205, POINT[1]), tangent=leaning)
+    assert isinstance(free, CutPlan) and isinstance(beside, CutPlan)
+    steep, level = (abs(plan.poses.cut.rotation[2, 0]) for plan in (free, beside))
+    assert level < steep - 0.1, "the blades are more level"
+    np.testing.assert_allclose(beside.poses.cut.translation, POINT)
+
+
+def keeper(below, towards=1.0):
+    """A cane that stays, which leaves a stub so far below the point (m), at 45°."""
+    start = POINT - [0.0, 0.0, below]
+    end = start + 0.15 * np.array([towards, 0.0, 1.0])
+    return Capsule("cane", tuple(start.tolist()), tuple(end.tolist()), 0.004, 0.004, 1, 1)
+
+
+def bitten(plan, capsule):
+    """Whether the cane would be between the closing blades: 30 mm wide, and 18 mm to either side of the cut."""
+    ends = (np.array([capsule.start, capsule.end]) - POINT) @ plan.poses.cut.rotation
+    at = ends[0] - ends[0, 1] / (ends[1, 1] - ends[0, 1]) * (ends[1] - ends[0])
+    return bool(abs(at[0]) < 0.015 + capsule.start_radius and abs(at[2]) < 0.018)
+
+
+@pytest.mark.parametrize("towards", [1.0, -1.0])
+def test_blades_that_remove_a_stub_lean_past_the_cane_that_stays(towards):
+    beside = keeper(0.018, towards)
+    straight = find(beside, tangent=(0.0, 0.0, 1.0))
+    stub = find(beside, tangent=(0.0, 0.0, 1.0), kind="renewal cut")
+    assert isinstance(straight, CutPlan) and isinstance(stub, CutPlan)
+    assert bitten(straight, beside) and not bitten(stub, beside)
+    np.testing.assert_allclose(stub.poses.cut.translation, POINT)
+
+
+def test_blades_do_not_lean_into_what_the_bark_hides_of_the_cane_that_stays():
+    """It is seen from 14 mm beside the stub on, and comes out of it 16 mm below the cut."""
+    whole = keeper(0.016)
+    start = POINT + [0.014, 0.0, -0.002]
+    seen = Capsule("cane", tuple(start.tolist()), whole.end, 0.004, 0.004, 1, 1)
+    plan = find(seen, tangent=(0.0, 0.0, 1.0), kind="renewal cut")
+    assert isinstance(plan, Unreachable) or not bitten(plan, whole)
+
+
+def test_a_stub_that_cannot_be_cut_without_the_cane_that_stays_is_refused():
+    plan = find(keeper(0.006), tangent=(0.0, 0.0, 1.0), kind="renewal cut")
+    assert isinstance(plan, Unreachable)
+    near = dict(plan.reason.values)["near"]
+    assert dict(near.values)["part"] == "blades" and "cane 0" in dict(near.values)["other"]
+
+
+def test_an_approach_set_by_a_person_is_kept_and_only_the_blades_lean():
+    turned = 0.2
+    free = find(tangent=(0.3, 0.0, 1.0), azimuth=turned)
+    beside = find(wire(POINT[2] + 0.0205, POINT[1]), tangent=(0.3, 0.0, 1.0), azimuth=turned)
+    assert isinstance(free, CutPlan) and isinstance(beside, CutPlan)
+    across = np.cross([0.3, 0.0, 1.0], [0.0, 1.0, 0.0])
+    for plan in (free, beside):
+        approach = plan.poses.cut.rotation[:, 2]
+        assert np.arctan2(approach @ across / np.linalg.norm(across), approach[1]) == pytest.approx(turned, abs=0.02)
 
 
 def test_a_wire_in_the_way_from_everywhere_is_said_to_be():

@@ -45,6 +45,17 @@ def test_a_tilt_comes_from_below_and_leans_the_cut_by_as_much():
     assert np.arccos(-poses.cut.rotation[2, 1]) == pytest.approx(0.2)
 
 
+def test_blades_that_lean_come_on_the_same_line_and_cut_at_the_same_place():
+    straight, leaning = (
+        cut_poses(POINT, np.array([0.0, 0.0, 1.0]), LEFT, 0.15, 0.25, 0.2, 0.1, lean) for lean in (0.0, 0.3)
+    )
+    for name in ("clear", "stand_off", "cut"):
+        np.testing.assert_allclose(getattr(leaning, name).translation, getattr(straight, name).translation, atol=1e-12)
+    np.testing.assert_allclose(leaning.cut.rotation[:, 2], straight.cut.rotation[:, 2])
+    turned = straight.cut.rotation.T @ leaning.cut.rotation
+    assert np.arccos(turned[1, 1]) == pytest.approx(0.3)
+
+
 def test_a_cane_that_points_at_the_robot_is_refused():
     with pytest.raises(InputError, match="straight at the robot"):
         cut_poses(POINT, LEFT, LEFT, 0.15, 0.25)

@@ -15,7 +15,7 @@ class Searches:
     def __init__(self) -> None:
         self.begun = 0
 
-    def find(self, position, tangent, q, azimuth=None):
+    def find(self, position, tangent, q, azimuth=None, kind="spur cut"):
         self.begun += 1
         return self.look()
 

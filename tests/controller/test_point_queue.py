@@ -125,6 +125,12 @@ def test_a_thick_cane_is_refused():
     assert q.accept("a", 3, "ada") == reasons.cane_too_thick("a", 18.0, 15.0)
 
 
+def test_a_stub_of_two_year_wood_may_be_thicker():
+    q = queue(*(point(name, radius=radius, kind="renewal cut") for name, radius in (("a", 0.009), ("b", 0.011))))
+    assert q.accept("a", 3, "ada") is None
+    assert q.accept("b", 3, "ada") == reasons.cane_too_thick("b", 22.0, 20.0)
+
+
 def test_order_of_work_is_along_the_row():
     q = queue(point("far", position=(2.0, 0.8, 1.0)), point("near", position=(-0.5, 0.9, 1.0)), point("mid"))
     assert [e.point_id for e in q.entries()] == ["near", "mid", "far"]

@@ -1,5 +1,7 @@
 """Map of the vines over all frames."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -44,6 +46,19 @@ def test_a_look_is_as_thick_as_most_looks_say():
     assert [only.observations for only in told] == [1, 2, 3, 4]
     assert told[0].radius == 0.004 and told[2].radius == pytest.approx(0.0041)
     assert told[3].radius == pytest.approx(0.00405) and told[3].nodes == cane().nodes
+
+
+def test_a_stub_is_what_most_looks_say_also_in_one_that_does_not_show_it():
+    def look(axis, radius):
+        return Plant((replace(plant(cane()).spurs[0], axis=axis, radius=radius),), TRUNK, ())
+
+    stub = plant().spurs[0].axis
+    map_, looks = PlantMap(), [(stub, 0.007), (stub + 0.001, 0.0072), (stub + 0.02, 0.015), (None, 0.0)]
+    told = [map_.update(look(*each), (NUMBER,))[0] for each in looks]
+    assert told[0].radius == 0.007 and told[2].radius == told[3].radius == pytest.approx(0.0072)
+    np.testing.assert_allclose(told[3].axis, stub + 0.001)
+    nothing = PlantMap().update(look(None, 0.0), (NUMBER,))[0]
+    assert nothing.axis is None and nothing.radius == 0.0
 
 
 def test_canes_side_by_side_stay_two():

@@ -10,6 +10,7 @@ from perception.plant.model import Cane, Node, Span, Spur
 from perception.rules.keep_out import KeepOut
 from perception.rules.pruning import Decision, apply_rule, choose_keeper, count_nodes, cut_arc, cutting_force
 from rolling_panda import reasons
+from rolling_panda.commands import SURE
 from rolling_panda.messages import Reason
 
 RULE = RuleConfig()
@@ -100,6 +101,41 @@ def test_the_old_stub_goes_in_one_cut_beyond_the_keeper():
     assert 0.93 < position[2] < 0.99 and abs(position[0]) < 1e-9
 
 
+def test_the_old_stub_goes_whether_or_not_the_cut_of_the_keeper_is_known():
+    high = cane(base=(0.0, 0.0, 0.99))
+    pruned = cane(nodes=(0.02, 0.10, 0.18), base=(0.025, 0.0, 0.93), length=0.205, end="free")
+    unclear = cane(nodes=(0.02, 0.10, 0.12, 0.18), base=(0.025, 0.0, 0.93))
+    whole = apply_rule(spur(cane(base=(0.025, 0.0, 0.93)), high), RULE).cuts[1]
+    for keeper, why in ((pruned, "pruned_already"), (unclear, "nodes_side_by_side")):
+        decision = apply_rule(spur(keeper, high), RULE)
+        (cut,) = decision.cuts
+        assert cut.kind == "renewal cut" and [reason.code for reason in decision.undecided] == [why]
+        np.testing.assert_allclose(cut.position, whole.position)
+        assert cut.confidence < SURE, "nobody accepts it without a look"
+    hidden = replace(unclear, base_gap=0.03)
+    assert apply_rule(spur(hidden, high), RULE) == Decision(undecided=(reasons.cane_base_hidden(),))
+
+
+def leaving(base, angle, towards=1.0):
+    """A cane that leaves its stub at an angle (rad) along the row."""
+    arc = np.linspace(0.0, 0.5, 101)
+    direction = np.array([towards * np.sin(angle), 0.0, np.cos(angle)])
+    nodes = tuple(Node(node, 30) for node in (0.02, 0.10, 0.18, 0.26))
+    return Cane(np.array(base) + arc[:, None] * direction, arc, 0.004, nodes, (), "image border", 0.0)
+
+
+@pytest.mark.parametrize("towards", [1.0, -1.0])
+def test_a_stub_goes_where_leaning_blades_pass_the_cane_that_stays(towards):
+    above = cane(base=(0.0, 0.0, 0.972))
+    wide, steep = (spur(leaving((0.0, 0.0, 0.941), angle, towards), above) for angle in (0.8, 0.3))
+    assert [cut.kind for cut in apply_rule(wide, RULE).cuts] == ["spur cut", "renewal cut"]
+    upright = RuleConfig(blade_lean=1e-6)
+    for seen, rule in ((steep, RULE), (wide, upright)):
+        decision = apply_rule(seen, rule)
+        assert [cut.kind for cut in decision.cuts] == ["spur cut"]
+        assert decision.undecided == (reasons.other_cane_left(reasons.shears_touch_keeper()),)
+
+
 def test_a_cut_where_another_cane_crosses_is_left_alone():
     crossing = np.array([[0.1 * k - 0.5, 0.008, 1.2] for k in range(11)])
     assert apply_rule(spur(cane()), RULE, crossing).undecided == (reasons.cane_crosses_cut(),)
@@ -165,6 +201,20 @@ def test_a_stub_is_not_cut_where_the_blades_must_not_go():
     assert [cut.kind for cut in decision.cuts] == ["spur cut"] and decision.undecided == (
         reasons.other_cane_left(near),
     )
+
+
+def test_a_stub_may_be_thicker_than_a_cane_but_not_than_the_shears_take():
+    low, high = cane(base=(0.025, 0.0, 0.93)), cane(base=(0.0, 0.0, 0.99))
+    thick, thicker = (replace(spur(low, high), radius=radius) for radius in (0.0095, 0.0105))
+    assert [cut.kind for cut in apply_rule(thick, RULE).cuts] == ["spur cut", "renewal cut"]
+    assert apply_rule(thicker, RULE).undecided == (reasons.other_cane_left(reasons.stub_beyond_shears(21.0)),)
+
+
+def test_a_stub_is_cut_midway_between_where_its_canes_come_out_of_it():
+    """Both are seen from the bark on: the lower one leaves at 45°, so that its axis comes out 10 mm farther down."""
+    low, high = leaving((0.010, 0.0, 0.94), np.pi / 4), cane(base=(0.0, 0.0, 0.985))
+    cut = apply_rule(spur(low, high), RULE).cuts[1]
+    assert cut.position[2] == pytest.approx((0.93 + 0.985) / 2, abs=1e-3)
 
 
 def test_a_cane_below_the_keeper_is_left_for_a_person():
