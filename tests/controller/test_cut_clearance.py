@@ -86,10 +86,11 @@ def test_blades_that_remove_a_stub_lean_past_the_cane_that_stays(towards):
     np.testing.assert_allclose(stub.poses.cut.translation, POINT)
 
 
-def test_blades_do_not_lean_into_what_the_bark_hides_of_the_cane_that_stays():
+@pytest.mark.parametrize("towards", [1.0, -1.0])
+def test_blades_do_not_lean_into_what_the_bark_hides_of_the_cane_that_stays(towards):
     """It is seen from 14 mm beside the stub on, and comes out of it 16 mm below the cut."""
-    whole = keeper(0.016)
-    start = POINT + [0.014, 0.0, -0.002]
+    whole = keeper(0.016, towards)
+    start = POINT + [0.014 * towards, 0.0, -0.002]
     seen = Capsule("cane", tuple(start.tolist()), whole.end, 0.004, 0.004, 1, 1)
     plan = find(seen, tangent=(0.0, 0.0, 1.0), kind="renewal cut")
     assert isinstance(plan, Unreachable) or not bitten(plan, whole)
