@@ -326,7 +326,7 @@ def never_watched(limit_s: float) -> None:
     """No operator has seen the robot yet; the limit is {limit_s:g} s."""
 
 
-@_reason("warning", "look at the robot")
+@_reason("warning", "look at the robot; if you do, the page draws too slowly: use another device")
 def unwatched(age_s: float, limit_s: float) -> None:
     """No operator has seen the robot for {age_s:.1f} s; the limit is {limit_s:g} s."""
 

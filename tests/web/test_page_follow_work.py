@@ -7,7 +7,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from rolling_panda.messages import page as p
-from tests.support.page_parts import mark
+from tests.support.page_parts import mark, open_screen
 from tests.support.played_page import box_of, until
 from tests.support.played_server import PlayedServer, controller, point
 
@@ -112,6 +112,17 @@ def test_at_work_list_and_picture_go_along_but_not_from_under_somebodys_hand(pag
     expect(mark(page, "p42")).to_have_attribute("aria-current", "true", timeout=15_000)
     is_shown(page, "p42")
     assert chosen(server)[2:] == [("p42", True)]
+
+
+def test_work_draws_the_cut_under_way_on_its_picture(page: Page, server: PlayedServer) -> None:
+    open_screen(page, "work")
+    at_work(server, "p40")
+    picture = page.locator(".work-picture")
+    expect(picture).to_have_attribute("data-shown", "yes")
+    expect(picture.locator(".blade > *").first).to_be_visible()
+    expect(picture.locator(".falls > *").first).to_be_attached()
+    head, cut = box_of(page.locator(".work-cut h2")), box_of(picture)
+    assert cut["y"] >= head["y"] + head["height"]
 
 
 def test_nobody_is_taken_along_while_nothing_is_cut_or_a_point_is_placed(page: Page, server: PlayedServer) -> None:

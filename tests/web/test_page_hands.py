@@ -122,6 +122,9 @@ def test_settings_and_help_are_used_with_the_keyboard_alone(page: Page) -> None:
     expect(switch).to_have_attribute("aria-checked", "false")
     switch.press("Enter")
     expect(switch).to_have_attribute("aria-checked", "true")
+    # A finger presses the words as well.
+    page.get_by_text("Gloves and sunlight", exact=True).click()
+    expect(switch).to_have_attribute("aria-checked", "false")
     switch.press("Escape")
     expect(page.locator("#settings")).to_be_hidden()
     page.keyboard.press("?")

@@ -183,6 +183,18 @@ def test_a_cut_is_called_wrong_and_right_again(page: Page, server: PlayedServer)
     assert server.posted == [("/api/points/p1/judge", {"wrong": True}), ("/api/points/p1/judge", {"wrong": False})]
 
 
+def test_a_second_press_takes_nothing_back_that_the_report_does_not_show_yet(page: Page, server: PlayedServer) -> None:
+    server.report = report(cut(1))
+    server.answers["/api/points/p1/judge"] = (200, {"ok": True})
+    open_screen(page, "report")
+    wrong = page.get_by_role("button", name="The cut at Vine 1 · spur 1 was wrong")
+    expect(wrong).to_have_attribute("aria-pressed", "false")
+    page.evaluate("() => { const button = document.querySelector('.judgement'); button.click(); button.click(); }")
+    until(page, lambda: len(server.posted) > 0)
+    page.wait_for_timeout(300)
+    assert server.posted == [("/api/points/p1/judge", {"wrong": True})]
+
+
 def test_it_goes_on_without_the_server_with_what_it_has(page: Page, server: PlayedServer) -> None:
     server.report = report(cut(1))
     open_screen(page, "report")

@@ -161,6 +161,17 @@ def test_the_words_of_a_banner_have_room_on_every_screen(
             assert box_of(words)["width"] >= 150
 
 
+def test_on_a_telephone_a_pause_hides_little_of_what_is_decided(page: Page, server: PlayedServer) -> None:
+    working(page, server)
+    choose(page, "p3")
+    page.set_viewport_size({"width": 390, "height": 844})
+    show_mode(page, server, controller("PAUSED", reason="nobody has looked at the robot for 2.0 s, and there is " * 3))
+    banner = page.locator("rp-alarms")
+    expect(banner).to_contain_text("Paused")
+    assert box_of(banner)["height"] <= 80
+    expect(page.locator(".next #to-continue, .next #resume").first).to_be_visible()
+
+
 def test_a_banner_covers_no_decision_beside_the_picture(
     page: Page, server: PlayedServer, subtests: pytest.Subtests
 ) -> None:

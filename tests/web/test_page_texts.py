@@ -120,7 +120,7 @@ FAMILIES: dict[str, Sequence[str]] = {
     "bar.${}": ("preview", "approve", "reset"),
     "bar.to_${}": ("review", "preview"),
     "keys.${}": (
-        *("stop", "decide", "undo", "step", "vine", "add"),
+        *("stop", "decide", "undo", "step", "vine", "add", "look", "zoom"),
         *("camera", "measure", "hold", "drive", "close", "help"),
     ),
     "hint.${}": ("next", "screens", "stop", "person"),

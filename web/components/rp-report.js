@@ -228,15 +228,23 @@ class RpReport extends HTMLElement {
    */
   judgement(cut, place) {
     const wrong = cut.wrong_by !== "";
+    let asked = false;
     const press = async () => {
+      // A second press would take back what the report does not show yet.
+      if (asked) return;
+      asked = true;
+      button.setAttribute("aria-pressed", String(!wrong));
       if (await judge(cut.point_id, !wrong)) await this.fetch();
+      else button.setAttribute("aria-pressed", String(wrong));
+      asked = false;
     };
-    return element("button", {
+    const button = element("button", {
       class: "judgement",
       text: text("report.wrong"),
       attributes: { "aria-pressed": String(wrong), "aria-label": text("report.wrong_cut", { place }) },
       onclick: () => void press(),
     });
+    return button;
   }
 
   /** What a person has to look at: cuts with an unknown outcome, points out of reach or without a decision, and places. */

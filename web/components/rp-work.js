@@ -5,6 +5,7 @@ import { isUncertain } from "../js/control/decisions.js";
 import { cutTime } from "../js/control/order.js";
 import { cuts, cutToShow, vines } from "../js/control/progress.js";
 import { select, selectAndReveal } from "../js/control/selection.js";
+import { cutOn, fetchPicture } from "../js/link/pictures.js";
 import { link, now, pageState, points, revealCount, selected, staleWords } from "../js/state/page-state.js";
 import { reasonText } from "../js/state/reasons.js";
 import { screen } from "../js/state/screens.js";
@@ -13,6 +14,7 @@ import { counted, labelOf, text } from "../js/state/texts.js";
 import { element, keepRows, setAttribute, setText } from "../js/views/dom.js";
 import { statusOf } from "../js/state/point-status.js";
 import { setStatus } from "../js/views/point-status.js";
+import { RpCutPicture } from "./rp-cut-picture.js";
 
 /** @typedef {import("../js/link/messages.js").PagePoint} PagePoint */
 
@@ -59,19 +61,21 @@ function theCut() {
   const count = element("p", { class: "work-count number" });
   const name = element("h2");
   const state = element("p", { class: "work-state", attributes: { role: "status" } });
-  const picture = element("img", { class: "work-picture", attributes: { alt: text("work.picture") } });
+  const picture = new RpCutPicture();
+  picture.classList.add("work-picture");
+  picture.inert = true;
   const why = element("p", { class: "hint" });
   const open = element("a", { class: "button", text: text("work.open"), attributes: { href: "#review" } });
   const box = element("section", { class: "work-cut" }, count, name, open, state, picture, why);
-  let of = "";
-  // Asked for again where it is not there yet.
-  picture.addEventListener("error", () => {
-    const missing = picture.src;
-    window.setTimeout(() => {
-      if (picture.src === missing) picture.src = missing;
-    }, AGAIN_MS);
-  });
-  picture.addEventListener("load", () => picture.classList.add("loaded"));
+  let [of, shown, timer] = ["", "", 0];
+  /** Asked for again where it is not there yet, or shows an older cut. @param {PagePoint} row @param {string} version */
+  const load = async (row, version) => {
+    const found = await fetchPicture(`api/points/${encodeURIComponent(row.point.point_id)}`);
+    if (shown !== version) return;
+    const { cut, pictured } = cutOn(found, row);
+    picture.show(found, cut, text("work.picture"));
+    if (pictured !== "shown") timer = window.setTimeout(() => void load(row, version), AGAIN_MS);
+  };
   open.addEventListener("click", () => select(of));
   drawOn([points, pageState, selected], () => {
     const controller = pageState.get()?.controller ?? null;
@@ -88,10 +92,12 @@ function theCut() {
     const words = reasonText(entry.reason) || reasonText(point.reason);
     setText(why, words);
     why.title = words;
-    const path = `api/points/${encodeURIComponent(of)}/picture?of=${point.digest}`;
-    if (picture.getAttribute("src") === path) return;
-    picture.classList.remove("loaded");
-    picture.src = path;
+    const version = `${of} ${point.revision} ${point.digest}`;
+    if (shown === version) return;
+    shown = version;
+    window.clearTimeout(timer);
+    picture.show(null, null, "");
+    void load(row, version);
   });
   return box;
 }

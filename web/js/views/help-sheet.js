@@ -14,6 +14,8 @@ const KEYS = Object.freeze([
   { does: "step", keys: ["←", "→"] },
   { does: "vine", keys: ["V"] },
   { does: "add", keys: ["N"] },
+  { does: "look", keys: ["L"] },
+  { does: "zoom", keys: ["+", "−"] },
   { does: "camera", keys: ["1", "2", "3", "4"] },
   { does: "measure", keys: ["M"] },
   { does: "hold", keys: ["H"] },

@@ -71,5 +71,6 @@ function toggle(name, words, hint, setting) {
   draw();
   const label = element("span", { id: `${id}-label`, text: words });
   const more = element("span", { id: `${id}-hint`, class: "hint", text: hint });
-  return element("div", { class: "setting" }, element("div", { class: "setting-words" }, label, more), button);
+  const said = element("div", { class: "setting-words", onclick: () => button.click() }, label, more);
+  return element("div", { class: "setting" }, said, button);
 }
