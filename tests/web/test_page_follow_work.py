@@ -119,7 +119,7 @@ def test_work_draws_the_cut_under_way_on_its_picture(page: Page, server: PlayedS
     at_work(server, "p40")
     picture = page.locator(".work-picture")
     expect(picture).to_have_attribute("data-shown", "yes")
-    expect(picture.locator(".blade > *").first).to_be_visible()
+    expect(picture.locator(".blade")).to_be_visible()
     expect(picture.locator(".falls > *").first).to_be_attached()
     head, cut = box_of(page.locator(".work-cut h2")), box_of(picture)
     assert cut["y"] >= head["y"] + head["height"]
