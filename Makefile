@@ -5,12 +5,13 @@ VENV := .venv
 BIN := $(VENV)/bin
 TYPESCRIPT := typescript@5.9.3
 
-.PHONY: help demo test test-training fast coverage check format docs bench mutation clean lock materials browser systemd drivers training peers
+.PHONY: help demo test test-peers test-training fast coverage check format docs bench mutation clean lock materials browser systemd drivers training peers
 .DEFAULT_GOAL := help
 
 help:
 	@echo "make demo    start everything in simulation; prints a link to sign in with   (ARGS='--port 8001 --seed 3')"
 	@echo "make test    make check, then every test"
+	@echo "make test-peers  the tests with others' controllers and planners"
 	@echo "make test-training  the tests of the training, with PyTorch"
 	@echo "make fast    quick tests: no browser, no processes, none that computes for seconds"
 	@echo "make coverage  make fast, then the lines and branches covered, by folder"
@@ -37,27 +38,31 @@ demo: $(VENV)/.project
 
 # First the tests that others may run beside, one more at once than there are cores, since a browser's test waits as much as
 # it computes; then those that keep real time, two at once; then those that anything beside them would disturb. Training
-# has its own target, since nothing else needs PyTorch.
+# and others' controllers have their own targets, since nothing else needs their packages.
+PEER_TESTS := tests/benchmarks/test_peers.py
 TRAINING_TESTS := tests/perception/test_training.py tests/perception/test_wide_training.py tests/perception/test_tune.py \
 	tests/perception/test_familiarity.py tests/perception/test_int8.py \
 	tests/benchmarks/test_familiarity_scores.py
-WITHOUT_TRAINING := $(TRAINING_TESTS:%=--ignore %)
+WITHOUT_EXTRAS := $(PEER_TESTS:%=--ignore %) $(TRAINING_TESTS:%=--ignore %)
 test: check browser systemd drivers
 ifdef ARGS
 	$(BIN)/pytest $(ARGS)
 else
-	$(BIN)/pytest -n $$(($$(nproc) + 1)) --dist worksteal -m "not (paced or alone or slow)" $(WITHOUT_TRAINING)
-	$(BIN)/pytest -n 2 --dist loadfile -m "paced and not (alone or slow)" $(WITHOUT_TRAINING)
-	$(BIN)/pytest -m "alone and not slow" $(WITHOUT_TRAINING)
+	$(BIN)/pytest -n $$(($$(nproc) + 1)) --dist worksteal -m "not (paced or alone or slow)" $(WITHOUT_EXTRAS)
+	$(BIN)/pytest -n 2 --dist loadfile -m "paced and not (alone or slow)" $(WITHOUT_EXTRAS)
+	$(BIN)/pytest -m "alone and not slow" $(WITHOUT_EXTRAS)
 	@echo "make test-training runs the tests of the training; it installs PyTorch"
 endif
+
+test-peers: peers
+	$(BIN)/pytest $(PEER_TESTS)
 
 test-training: training
 	$(BIN)/pytest $(TRAINING_TESTS)
 
 # Fewer random examples than `make test` has.
 FAST = HYPOTHESIS_PROFILE=fast $(BIN)/pytest -n auto -m "not (paced or alone or slow or browser or processes or long)" \
-	$(WITHOUT_TRAINING) tests/bridge tests/controller tests/perception tests/recorder tests/rolling_panda tests/server
+	$(WITHOUT_EXTRAS) tests/bridge tests/controller tests/perception tests/recorder tests/rolling_panda tests/server
 fast: $(VENV)/.project
 	$(FAST)
 

@@ -7,8 +7,6 @@ from benchmarks.__main__ import main
 from benchmarks.control import approach
 from benchmarks.control.arm_path import ArmPath
 from benchmarks.control.plan_limits import plan_limits
-from benchmarks.control.reach_targets import HOME
-from benchmarks.peers.sampling import OMPL, OmplPlanner
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.obstacle import Obstacle
 from rolling_panda.model.robot import ARM_Q, RobotModel
@@ -55,21 +53,3 @@ def test_wrong_numbers_and_unknown_planners_are_refused(words, capsys):
         approach.main(words)
     assert end.value.code == 2
     assert "at least 1" in (error := capsys.readouterr().err) or "invalid choice" in error
-
-
-@pytest.mark.parametrize("name", OMPL)
-def test_a_planner_of_ompl_goes_round_a_post_and_takes_the_straight_line_where_it_is_free(name):
-    pytest.importorskip("ompl", reason="OMPL is not installed: make peers")
-    collision = CollisionModel(RobotModel())
-    planner = OmplPlanner(name, collision, LIMITS, seconds=2.0)
-    q = np.zeros(12)
-    q[ARM_Q] = HOME
-    straight = planner.find(q, LEFT)
-    assert straight is not None and len(straight.postures) == 2
-    collision.set_obstacles([POST])
-    q[ARM_Q] = LEFT
-    around = planner.find(q, RIGHT)
-    assert around is not None and len(around.postures) > 2
-    np.testing.assert_allclose(around.postures[[0, -1]], [LEFT, RIGHT])
-    judged = approach.way(approach.Task(0, q, RIGHT, (POST,)), name, LIMITS, 2.0)
-    assert judged.found and judged.clearance > -0.02

@@ -8,10 +8,8 @@ from benchmarks.__main__ import main
 from benchmarks.control import reach, reach_targets
 from benchmarks.control.arm_ik import ArmIk
 from benchmarks.control.reach_judge import BaseBounds, Trajectory, judge, rolling, violations
-from benchmarks.control.reach_run import BASE, Runner, bench_config
-from benchmarks.peers.reactive import reactive
+from benchmarks.control.reach_run import BASE, Runner
 from controller.whole_body.collision import CollisionModel
-from controller.whole_body.task import IkProblem, Posture, ToolTask
 from rolling_panda.errors import InputError
 from rolling_panda.model.robot import RobotModel
 
@@ -226,22 +224,6 @@ def test_methods_are_judged_beside_each_other_on_the_same_goals(tmp_path, capsys
     assert theirs["summary"]["near"] >= 1
     table = capsys.readouterr().out.splitlines()[-2:]
     assert table[0].startswith("hierarchy") and table[1].startswith("holistic")
-
-
-@pytest.mark.parametrize("name", ["pink", "mink"])
-def test_an_installed_peer_follows_a_twist_within_the_limits_and_leaves_frozen_wheels_alone(name):
-    pytest.importorskip(name, reason=f"{name} is not installed: make peers")
-    config = bench_config("hierarchy").whole_body
-    method = reactive(name, ROBOT, config, 0.01)
-    q = still().q[0]
-    kinematics = ROBOT.kinematics(q)
-    twist = np.array([0.0, 0.05, 0.0, 0.0, 0.0, 0.0])
-    xi = np.zeros(9)
-    for _ in range(30):
-        problem = IkProblem(q, kinematics, xi, ToolTask(twist), Posture(q), base="frozen")
-        xi = method.solve(problem).xi
-    assert np.abs(xi[:2]).max() < 1e-6
-    np.testing.assert_allclose(kinematics.J_xi @ xi, twist, atol=2e-3)
 
 
 def test_the_command_prints_a_table_and_writes_every_figure(tmp_path, capsys):

@@ -123,7 +123,7 @@ def test_on_a_telephone_the_picture_to_tap_comes_into_sight(page: Page, server: 
     page.set_viewport_size({"width": 390, "height": 844})
     open_screen(page, "review")
     page.locator("#add-by-hand").scroll_into_view_if_needed()
-    picture = page.locator("rp-cut-picture")
+    picture = page.locator("rp-review rp-cut-picture")
     assert box_of(picture)["y"] < box_of(page.locator("main"))["y"]
     page.locator("#add-by-hand").click()
     until(page, lambda: box_of(picture)["y"] >= box_of(page.locator("main"))["y"])

@@ -75,12 +75,14 @@ def test_the_first_cut_to_decide_is_pictured_with_what_falls_and_what_stays(page
     assert blade["y"] < stays["y"] < blade["y"] + blade["height"]
     expect(picture.locator(".nodes circle")).to_have_count(2)
     expect(picture.locator(".others path")).to_have_count(0)
-    assert "/api/points/p1/picture?image=00010001" in server.pictures_fetched
+    assert "/api/points/p1/drawing" in server.pictures_fetched
+    # Points of a spur share an image, which is fetched once.
+    assert sum(path.endswith("picture?image=00010001") for path in server.pictures_fetched) == 1
 
 
 def test_the_picture_zooms_by_wheel_and_buttons_and_the_next_one_is_whole(page: Page, server: DecidingServer) -> None:
     review = looking_at(page, "p1")
-    drawing = page.locator("rp-cut-picture .outside")
+    drawing = page.locator("rp-review rp-cut-picture .outside")
     assert drawing.get_attribute("viewBox") == f"0.00 0.00 {SIZE[0]:.2f} {SIZE[1]:.2f}"
     before = box_of(review.locator(".blade .tips"))
     review.get_by_role("button", name="Zoom in").click()
@@ -148,7 +150,7 @@ def test_a_picture_of_an_older_cut_shows_no_cut(page: Page, server: DecidingServ
     expect(review.locator(".blade path")).to_have_count(0)
     server.drawn_revisions.clear()
     looking_at(page, "p3")
-    expect(page.locator(".blade .core")).to_have_count(1)
+    expect(page.locator("rp-review .blade .core")).to_have_count(1)
 
 
 # --- deciding --------------------------------------------------------------------------------------------------------
@@ -417,18 +419,18 @@ def test_a_cut_is_dragged_along_its_cane_and_put_back_where_that_is_refused(page
         page.mouse.move(x + 30, y - pixels * scale)
 
     drag(6)
-    expect(page.locator(".picture-moved")).to_have_text(f"+{1000 * 6 * METRES:.0f} mm")
+    expect(page.locator("rp-review .picture-moved")).to_have_text(f"+{1000 * 6 * METRES:.0f} mm")
     page.mouse.up()
     until(page, lambda: server.posted == [("/api/points/p1/move", {"along": 0.012})])
     # Where no other cut comes of it, the old one is shown again.
-    expect(page.locator(".picture-moved")).to_be_hidden()
+    expect(page.locator("rp-review .picture-moved")).to_be_hidden()
     page.locator("#undo").click()
     until(page, lambda: server.posted[-1] == ("/api/points/p1/move", {"along": -0.012}))
     server.answers["/api/points/p1/move"] = (409, {"ok": False, "reason": "4 mm from a bud: the blades need 10 mm"})
     drag(-4)
     page.mouse.up()
     expect(page.locator(".toast").last).to_contain_text("4 mm from a bud")
-    expect(page.locator(".picture-moved")).to_be_hidden()
+    expect(page.locator("rp-review .picture-moved")).to_be_hidden()
     assert box_of(review.locator(".blade .tips"))["y"] == pytest.approx(before["y"], abs=1.0)
     assert server.state_of("p1") == "PROPOSED" and len(server.posted) == 3
 
@@ -447,7 +449,7 @@ def test_a_point_is_moved_by_millimetres_and_an_accepted_one_is_not(page: Page, 
     expect(page.get_by_role("button", name="+1")).to_have_attribute(
         "title", text_of(reasons.acceptance_stands("Vine 1, spur 1"))
     )
-    expect(page.locator(".handle")).to_have_attribute("visibility", "hidden")
+    expect(page.locator("rp-review .handle")).to_have_attribute("visibility", "hidden")
 
 
 def test_where_the_robot_would_stand_is_told(page: Page, server: DecidingServer) -> None:
