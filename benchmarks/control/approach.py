@@ -2,8 +2,8 @@
 
 Rows are grown; before each right cut of the truth the base stands and the arm ends as the goal chooser has it. It
 begins right before the cut to the left, or in the survey posture where the arm cannot be there. All planners get the
-same start, goal and capsules: posts, trunks, cordons, wires and the wood that stays. The judge looks at each way five
-times as densely as the planners do.
+same start, goal and capsules: posts, trunks, cordons, wires and the wood that stays. The judge looks at each way twice
+as densely as the planners do.
 """
 
 import time
@@ -38,8 +38,8 @@ _BEFORE, _CLEARANCE = 0.04, 0.005
 _LOOK = 0.01
 #: Planners: ours, and those of OMPL.
 PLANNERS = ("ours", *OMPL)
-#: Kinds of wood that stand in the way whether they stay or not.
-_INFRASTRUCTURE = ("post", "trunk", "cordon", "wire", "spur")
+#: What is in the way and is not pruned.
+_FIXED = ("post", "trunk", "cordon", "wire", "spur")
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ def tasks(seed: int, limits: PlanLimits) -> list[Task]:
             max(rod.start_radius, rod.end_radius),
         )
         for number, rod in row.standing()
-        if rod.kind in _INFRASTRUCTURE or number in staying
+        if rod.kind in _FIXED or number in staying
     )
     robot = RobotModel()
     collision = CollisionModel(robot)

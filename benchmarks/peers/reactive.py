@@ -5,7 +5,9 @@ time, as it does for the method `nullspace`. None of them knows obstacles or the
 """
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable
+from functools import partial
 from typing import Any, Protocol
 
 import daqp
@@ -16,10 +18,8 @@ from benchmarks.peers.problem import rates, robot_urdf
 from controller.config import WholeBodyConfig
 from controller.motion.follower import tool_error
 from controller.whole_body.actuation import Actuation
-from controller.whole_body.collision import CollisionModel
-from controller.whole_body.guards.collision import CollisionGuard
 from controller.whole_body.manipulability import ArmManipulability
-from controller.whole_body.registry import Maker, SpeedScaling
+from controller.whole_body.registry import Maker, with_speed_scaling
 from controller.whole_body.saturation import Saturation
 from controller.whole_body.task import ActuatorTask, IkProblem, Method, Solution, ToolTask
 from rolling_panda.errors import RollingPandaError
@@ -40,7 +40,7 @@ class Aimed(Method, Protocol):
         ...
 
 
-class _Peer:
+class _Peer(ABC):
     """What the peers share: limits, and a stop where there is no answer."""
 
     name = ""
@@ -65,8 +65,9 @@ class _Peer:
         limited = self._saturation.apply(wanted, problem.q, problem.sent)
         return Solution(limited.xi, limited.scale, omega, not limited.braked, "a limit" if limited.braked else "")
 
+    @abstractmethod
     def _wanted(self, problem: IkProblem) -> Array | None:
-        raise NotImplementedError
+        """ξ̇ (9) before any limit but those that the peer keeps itself; None without an answer."""
 
     def _constraints(self, problem: IkProblem, rolling: Any, wheels: Any) -> list[Any]:
         """Rolling, and the wheels' velocities where they are given: at rest, or as they are measured."""
@@ -193,8 +194,8 @@ class Holistic(_Peer):
     #: Gain of the servo (1/s), cost of joint velocities, gain of facing the tool, and the dampers' distances (rad) and
     #: gain, as published.
     _SERVO, _JOINTS, _FACING, _STOP, _INFLUENCE, _DAMPING = 1.5, 0.01, 0.5, 0.1, 0.9, 1.0
-    #: Least distance to the goal that counts, and where it stops (m; turning, ten times the number in rad); most of the
-    #: slack.
+    #: Least distance to the goal that counts (m). Where it stops: so near (m), turned by ten times that (rad).
+    #: Bound of the slack (m/s, rad/s).
     _LEAST, _THERE, _SLACK = 1e-3, 1e-4, 10.0
 
     def __init__(self, robot: RobotModel, config: WholeBodyConfig, dt: float) -> None:
@@ -275,14 +276,7 @@ def reactive(name: str, robot: RobotModel, config: WholeBodyConfig, dt: float) -
 
 def in_rows(name: str) -> Maker:
     """A peer for the controller: like methods without inequalities of their own it is braked before obstacles."""
-
-    def maker(robot: RobotModel, config: WholeBodyConfig, dt: float, collision: CollisionModel | None) -> Method:
-        method = reactive(name, robot, config, dt)
-        if collision is None or not config.hierarchy.collisions:
-            return method
-        return SpeedScaling(method, CollisionGuard(collision, config.hierarchy, dt), Saturation(robot, config, dt))
-
-    return maker
+    return with_speed_scaling(partial(reactive, name))
 
 
 def _turning(free: bool) -> Any:

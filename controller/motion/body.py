@@ -35,8 +35,8 @@ _LONGEST = 0.1
 _BELIEVED = 0.2
 #: Spots of the way that are remembered, to go back on: at full speed 3 s.
 _TRAIL = 300
-#: The next spot is remembered where the tool (m) or a joint or wheel (rad) has moved so far: who goes back from where
-#: the robot has pressed for seconds goes back at once.
+#: A spot is added where the tool (m), or a joint or wheel (rad), has moved so far since the last one. Pressing in place
+#: adds none, so that the way back begins with motion.
 _TRAIL_TOOL, _TRAIL_JOINT = 0.0005, 0.002
 #: A larger difference from the odometry (m, rad) is no noise: the estimate is reset.
 _ELSEWHERE = 0.05

@@ -106,7 +106,7 @@ def _hierarchy(robot: RobotModel, config: WholeBodyConfig, dt: float, collision:
     return Hierarchy(robot, config, dt, guards(robot, config, dt, collision))
 
 
-def _with_speed_scaling(make: Callable[[RobotModel, WholeBodyConfig, float], Method]) -> Maker:
+def with_speed_scaling(make: Callable[[RobotModel, WholeBodyConfig, float], Method]) -> Maker:
     """Methods that know no inequalities beyond the limits are braked where obstacles are known."""
 
     def maker(robot: RobotModel, config: WholeBodyConfig, dt: float, collision: CollisionModel | None) -> Method:
@@ -120,6 +120,6 @@ def _with_speed_scaling(make: Callable[[RobotModel, WholeBodyConfig, float], Met
 
 METHODS: dict[str, Maker] = {
     Hierarchy.name: _hierarchy,
-    Nullspace.name: _with_speed_scaling(Nullspace),
-    Decoupled.name: _with_speed_scaling(Decoupled),
+    Nullspace.name: with_speed_scaling(Nullspace),
+    Decoupled.name: with_speed_scaling(Decoupled),
 }

@@ -44,7 +44,7 @@ class BackOff:
         self.done, self.arrived = len(way) < 2, False
 
     def step(self, robot: Measured, follower: Follower, beyond: bool) -> Tracking:
-        """One period; `beyond` says whether something is touched beyond what may be on this way."""
+        """One period; with `beyond` a limit of the contact is passed, which ends this way back once it has begun."""
         progress = quintic(self._time, self._duration)
         last = len(self._way) - 1
         at = progress.s * last

@@ -9,22 +9,19 @@ from bridge.sim.robot.trace import TraceWriter
 from rolling_panda.messages.types import ArmTorques
 from tests.support.controller_at_work import working
 from tests.support.points import point
+from tests.support.worlds.kinematic_robot import KinematicLoop
 
 STILL: ArmTorques = (0.0,) * 7
 PUSHED: ArmTorques = (0.0, 0.0, 0.0, 30.0, 0.0, 0.0, 0.0)
 
 
-class Beside:
+class Beside(KinematicLoop):
     """What the supervisor needs of a loop, with a kinematic robot that is pushed on the way to `pushed`."""
 
     def __init__(self, pushed=(), **changes):
-        self.robot = working(
-            (point("a", (0.45, 0.75, 1.0)), point("b", (0.9, 0.75, 1.05))), external_torque=STILL, **changes
-        )
-        self.controller, self.command = self.robot.controller, self.robot.ask
+        points = (point("a", (0.45, 0.75, 1.0)), point("b", (0.9, 0.75, 1.05)))
+        super().__init__(working(points, external_torque=STILL, **changes))
         self.pushed, self.active = pushed, ""
-
-    now = property(lambda self: self.robot.now)
 
     def queue(self, *states):
         return (entry for entry in self.robot.state.queue if not states or entry.state in states)
@@ -36,14 +33,6 @@ class Beside:
                 self.active = self.robot.state.active_point_id
             advances = self.controller.mode == "AUTO" and self.robot.state.phase == "ADVANCE"
             self.robot.external_torque = PUSHED if advances and self.active in self.pushed else STILL
-
-    def run_until(self, condition, limit_s):
-        end = self.now + limit_s
-        while self.now < end:
-            self.run(0.05)
-            if condition():
-                return True
-        return False
 
     def work(self, person):
         """Until the work ends, or the person gives up."""

@@ -6,22 +6,20 @@ from controller.core import Controller
 from rolling_panda import commands as intents
 from rolling_panda.config import RobotConfig
 from tests.support.points import point
-from tests.support.worlds.kinematic_robot import KinematicRobot
+from tests.support.worlds.kinematic_robot import KinematicLoop, KinematicRobot
 
 CONFIG = ControllerConfig()
 
 
-class Beside:
+class Beside(KinematicLoop):
     """What `walk` needs of a loop, with a kinematic robot and a camera that sees 0.5 m to either side."""
 
     def __init__(self, row):
-        self.robot = KinematicRobot(Controller(CONFIG, RobotConfig()), CONFIG.work.home)
-        self.controller, self.command = self.robot.controller, self.robot.ask
+        super().__init__(KinematicRobot(Controller(CONFIG, RobotConfig()), CONFIG.work.home))
         self._row, self._seen = row, {}
         self.run(0.1)
         assert self.command(intents.Arm(user="bench")).ok
 
-    now = property(lambda self: self.robot.now)
     state = property(lambda self: self.robot.state)
 
     inbox = property(lambda self: self.robot.inbox)
@@ -35,14 +33,6 @@ class Beside:
             if step % 10 == 0:
                 self._seen |= {name: x for name, x in self._row.items() if abs(x - self.robot.q[0] - 0.3) < 0.5}
                 self.robot.show(tuple(point(name, (x, 0.76, 1.05)) for name, x in self._seen.items()))
-
-    def run_until(self, condition, limit_s):
-        end = self.now + limit_s
-        while self.now < end:
-            self.run(0.05)
-            if condition():
-                return True
-        return False
 
 
 def test_what_comes_into_view_on_the_way_is_cut_and_gaps_are_driven_over():

@@ -1,5 +1,6 @@
 """A robot without mass or contact: velocities follow commands with a first-order lag. For control tests and timing."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, is_dataclass
 from typing import Any
 
@@ -239,3 +240,31 @@ class KinematicRobot:
             self.xi += (command - self.xi) * min(dt / self.lag, 1.0)
             self.q[:3] = self.model.drive.integrate(self.q[:3], float(self.xi[0] * dt), float(self.xi[1] * dt))
             self.q[3:] += self.xi * dt
+
+
+class KinematicLoop:
+    """What a benchmark needs of a closed loop, with a kinematic robot. Subclasses say what happens in `run`."""
+
+    def __init__(self, robot: KinematicRobot) -> None:
+        """Around a robot."""
+        self.robot = robot
+        self.controller, self.command = robot.controller, robot.ask
+
+    @property
+    def now(self) -> float:
+        """Time (s)."""
+        return self.robot.now
+
+    def run(self, seconds: float) -> None:
+        """Run for so long."""
+        for _ in range(round(seconds / self.robot.dt)):
+            self.robot.step()
+
+    def run_until(self, condition: Callable[[], bool], limit_s: float) -> bool:
+        """Run until a condition holds, but not longer than the limit; whether it holds."""
+        end = self.now + limit_s
+        while self.now < end:
+            self.run(0.05)
+            if condition():
+                return True
+        return False
