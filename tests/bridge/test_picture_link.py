@@ -1,6 +1,5 @@
 """What the simulated camera shows of a row."""
 
-import time
 import tomllib
 
 import msgspec
@@ -202,16 +201,3 @@ def test_bark_and_light_differ_from_seed_to_seed_unless_switched_off():
         # The brightness of a single trunk differs anyway.
         tone = np.array(colors) / np.sum(colors, axis=1, keepdims=True)
         assert (np.std(tone, axis=0).max() > 0.004) == differs
-
-
-@pytest.mark.alone
-def test_a_small_frame_takes_less_than_a_tenth_of_a_second():
-    config = CameraConfig(width=424, height=240)
-    row, camera = grow(VineyardConfig(), 0), Camera(config, 0)
-    times = []
-    for frame in range(4):
-        began = time.process_time()
-        camera.render(row, looking_left(x=0.5), frame)
-        times.append(time.process_time() - began)
-    # The first one meshes the row.
-    assert min(times[1:]) < 0.1

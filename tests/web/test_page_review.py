@@ -4,7 +4,7 @@ import time
 
 import msgspec
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
 from rolling_panda import messages as m
 from rolling_panda import reasons
@@ -214,6 +214,23 @@ def test_everything_is_undone_step_by_step_and_is_looked_at_again(page: Page, se
     looking_at(page, "p1")
     assert server.state_of("p1") == "PROPOSED"
     expect(page.locator("#undo")).to_be_disabled()
+
+
+def test_an_undo_before_the_answer_takes_back_that_decision_and_none_before_it(
+    page: Page, server: DecidingServer
+) -> None:
+    looking_at(page, "p1")
+    page.keyboard.press("a")
+    looking_at(page, "p3")
+    until(page, lambda: server.state_of("p1") == "ACCEPTED")
+    held: list[Route] = []
+    page.route("**/api/points/p3/accept", lambda route: held.append(route), times=1)
+    page.keyboard.press("a")
+    until(page, lambda: len(held) == 1)
+    page.keyboard.press("z")
+    held[0].continue_()
+    until(page, lambda: server.posted[-1][0] == "/api/points/p3/reconsider")
+    assert [server.state_of(name) for name in ("p1", "p3")] == ["ACCEPTED", "PROPOSED"]
 
 
 def test_what_was_decided_before_a_cut_is_not_offered_to_undo(page: Page, server: DecidingServer) -> None:

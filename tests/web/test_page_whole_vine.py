@@ -112,6 +112,18 @@ def test_all_is_taken_back_by_one_press_each_but_not_what_was_cut_since(page: Pa
     expect(page.locator("#undo")).to_be_disabled()
 
 
+def test_what_is_accepted_can_be_taken_back_before_the_robot_tells_of_it(
+    page: Page, server: DecidingServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looking_at(page, "p1")
+    opened(page)
+    monkeypatch.setattr(server, "tell", lambda message: None)
+    page.keyboard.press("a")
+    until(page, lambda: [server.state_of(name) for name in ("p1", "p2")] == ["ACCEPTED"] * 2)
+    page.keyboard.press("z")
+    until(page, lambda: [server.state_of(name) for name in ("p1", "p2")] == ["PROPOSED"] * 2)
+
+
 def test_what_is_taken_out_is_not_decided_about_and_comes_next(page: Page, server: DecidingServer) -> None:
     looking_at(page, "p1")
     opened(page)

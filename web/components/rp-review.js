@@ -477,7 +477,7 @@ class RpReview extends HTMLElement {
 function undoButton(/** @type {() => void} */ act) {
   const button = element("button", { id: "undo", text: text("queue.undo"), onclick: act });
   drawOn([decisions, points, pageState, link, now], () => {
-    setEnabled(button, whyNoUndo(), text("queue.undo_hint", { words: lastDecision()?.words ?? "" }));
+    setEnabled(button, whyNoUndo(), text("queue.undo_hint", { words: lastDecision()?.words() ?? "" }));
   });
   return button;
 }

@@ -1,7 +1,7 @@
 // The pruning rule. A slider asks for a what-if; Apply puts the rule in force, and Undo reverts it.
 
 import { whyNothingOf } from "../js/control/allowed.js";
-import { pushUndo } from "../js/control/decisions.js";
+import { undoable } from "../js/control/decisions.js";
 import { ask, post } from "../js/link/api.js";
 import { link, now, pageState, points } from "../js/state/page-state.js";
 import { reason, reasonText } from "../js/state/reasons.js";
@@ -21,11 +21,10 @@ function tryRule(rule) {
 }
 
 /** @param {PruningRule} rule */
-async function applyRule(rule) {
-  const done = await ask(text("rule.asked"), "api/rule", rule);
+function applyRule(rule) {
   // Refused unless it is still in force: another person's rule cannot be undone from here.
-  if (done) pushUndo(text("rule.named", { rule: ruleWords(rule) }), () => ask(text("rule.taking_back"), "api/rule/undo", rule));
-  return done;
+  const back = () => ask(text("rule.taking_back"), "api/rule/undo", rule);
+  return undoable(ask(text("rule.asked"), "api/rule", rule), () => text("rule.named", { rule: ruleWords(rule) }), back);
 }
 
 /** @param {PruningRule} rule */

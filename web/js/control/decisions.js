@@ -14,7 +14,7 @@ import { reason, saidText } from "../state/reasons.js";
 /**
  * `about` is the key of the point or place that it was about; empty for several.
  *
- * @typedef {{ words: string, undo: () => Promise<boolean>, about: string }} Decision
+ * @typedef {{ words: () => string, undo: () => Promise<boolean>, about: string }} Decision
  */
 
 /** From the order to cut on, what was decided of a point before stands. @type {readonly PointState[]} */
@@ -56,22 +56,19 @@ export function whyNotReject(row) {
 }
 
 /** @param {PagePoint} row */
-export async function accept(row) {
+export function accept(row) {
   if (isUnknown(row)) return resolve(row, "DONE", "seen by eye");
-  const done = await sendAcceptance(row);
-  if (done) pushUndo(text("undo.accepting", { point: nameOf(row) }), () => restore(row), row.point.point_id);
-  return done;
+  return undoable(sendAcceptance(row), () => text("undo.accepting", { point: nameOf(row) }), () => restore(row), row.point.point_id);
 }
 
 /**
  * @param {PagePoint} row
  * @param {string} reason
  */
-export async function reject(row, reason) {
+export function reject(row, reason) {
   if (isUnknown(row)) return resolve(row, "FAILED_NOT_CUT", reason || "seen by eye");
-  const done = await send(row, "rejecting", "reject", { reason });
-  if (done) pushUndo(text("undo.rejecting", { point: nameOf(row) }), () => restore(row), row.point.point_id);
-  return done;
+  const sent = send(row, "rejecting", "reject", { reason });
+  return undoable(sent, () => text("undo.rejecting", { point: nameOf(row) }), () => restore(row), row.point.point_id);
 }
 
 /**
@@ -107,15 +104,9 @@ export function sendAcceptance(row) {
   return send(row, "accepting", "accept", { revision: row.point.revision, digest: row.point.digest });
 }
 
-/**
- * Take back the acceptance of these points; what was cut or decided again since is left alone.
- *
- * @param {readonly PagePoint[]} rows
- */
-export async function takeBack(rows) {
-  const accepted = rows.map((row) => now(row)).filter(isAccepted);
-  const back = await Promise.all(accepted.map((row) => row && send(row, "reconsidering", "reconsider", {})));
-  return back.every(Boolean);
+/** Have a point proposed again. @param {PagePoint} row */
+export function reconsider(row) {
+  return send(row, "reconsidering", "reconsider", {});
 }
 
 /**
@@ -132,11 +123,10 @@ export function whyNotMove(row) {
  * @param {PagePoint} row
  * @param {number} millimetres Along the cane, away from the cordon.
  */
-export async function move(row, millimetres) {
-  const done = await send(row, "moving", "move", { along: millimetres / 1000 });
-  const words = text("undo.moving", { point: nameOf(row), distance: millimetres });
-  if (done) pushUndo(words, () => send(row, "moving_back", "move", { along: -millimetres / 1000 }), row.point.point_id);
-  return done;
+export function move(row, millimetres) {
+  const sent = send(row, "moving", "move", { along: millimetres / 1000 });
+  const words = () => text("undo.moving", { point: nameOf(row), distance: millimetres });
+  return undoable(sent, words, () => send(row, "moving_back", "move", { along: -millimetres / 1000 }), row.point.point_id);
 }
 
 /**
@@ -162,7 +152,7 @@ export async function undo() {
   const last = lastDecision();
   if (!last) return;
   decisions.set(decisions.get().filter((each) => each !== last));
-  if (await last.undo()) say("info", text("undo.done", { words: last.words }));
+  if (await last.undo()) say("info", text("undo.done", { words: last.words() }));
 }
 
 /** Why there is nothing to undo. */
@@ -171,12 +161,20 @@ export function whyNoUndo() {
 }
 
 /**
- * @param {string} words
+ * Note a decision while it is sent. An undo before the answer waits for it, so that it takes back this decision and none
+ * before it. A refused one is forgotten.
+ *
+ * @param {Promise<boolean>} sent Was it done?
+ * @param {() => string} words
  * @param {() => Promise<boolean>} back
  * @param {string} [about] Key of the one point or place that it is about.
  */
-export function pushUndo(words, back, about = "") {
-  decisions.set([...decisions.get(), { words, undo: back, about }].slice(-MOST));
+export async function undoable(sent, words, back, about = "") {
+  const decision = { words, undo: async () => (await sent) && back(), about };
+  decisions.set([...decisions.get(), decision].slice(-MOST));
+  const done = await sent;
+  if (!done) decisions.set(decisions.get().filter((each) => each !== decision));
+  return done;
 }
 
 /**
@@ -188,7 +186,7 @@ async function restore(before) {
   const { state, reason } = before.entry;
   if (isAccepted(before)) return sendAcceptance(before);
   if (state === "REJECTED") return send(before, "rejecting", "reject", { reason: saidText(reason) });
-  return send(before, "reconsidering", "reconsider", {});
+  return reconsider(before);
 }
 
 /**
@@ -210,7 +208,3 @@ function send(row, what, action, body) {
   return ask(text(`decision.${what}`, { point: nameOf(row) }), `api/points/${encodeURIComponent(row.point.point_id)}/${action}`, body);
 }
 
-/** @param {PagePoint} row */
-function now(row) {
-  return points.get()?.points.find((other) => other.point.point_id === row.point.point_id);
-}

@@ -6,7 +6,7 @@ import { pageState, points } from "../state/page-state.js";
 import { pointNames } from "../state/point-names.js";
 import { counted, text } from "../state/texts.js";
 import { countOf, whyNot, whyNotPoint } from "./allowed.js";
-import { nameOf, pushUndo } from "./decisions.js";
+import { nameOf, undoable } from "./decisions.js";
 
 /** @typedef {import("../link/messages.js").PagePoint} PagePoint */
 /** @typedef {import("../link/messages.js").PointPlan} PointPlan */
@@ -79,11 +79,9 @@ export function whyNotTurn(row) {
  * @param {PagePoint} row
  * @param {number|null} azimuth About the cane (rad); null leaves it to the search.
  */
-export async function turnApproach(row, azimuth) {
+export function turnApproach(row, azimuth) {
   const name = row.point.point_id;
   const turn = (/** @type {number|null} */ to) =>
     ask(text("order.turning", { point: nameOf(row) }), `api/points/${encodeURIComponent(name)}/approach`, { azimuth: to });
-  const done = await turn(azimuth);
-  if (done) pushUndo(text("undo.turning", { point: nameOf(row) }), () => turn(row.entry.azimuth), name);
-  return done;
+  return undoable(turn(azimuth), () => text("undo.turning", { point: nameOf(row) }), () => turn(row.entry.azimuth), name);
 }

@@ -7,7 +7,7 @@ import { reasonText } from "../state/reasons.js";
 import { signal } from "../state/signals.js";
 import { text } from "../state/texts.js";
 import { whyNothingOf } from "./allowed.js";
-import { pushUndo } from "./decisions.js";
+import { undoable } from "./decisions.js";
 import { select } from "./selection.js";
 
 /** Do clicks place points? */
@@ -36,7 +36,7 @@ export async function placePoint(path, body) {
   const answer = await post(path, body);
   if (answer.ok) {
     const point = String(answer.why?.values.find(([name]) => name === "point")?.[1] ?? "");
-    pushUndo(text("undo.placing"), () => unplace(point), point);
+    void undoable(Promise.resolve(true), () => text("undo.placing"), () => unplace(point), point);
     select(point);
     showToast("info", reasonText(answer.why));
     return point;

@@ -5,7 +5,7 @@ import { points, selected } from "../state/page-state.js";
 import { statusOf } from "../state/point-status.js";
 import { signal } from "../state/signals.js";
 import { counted, text } from "../state/texts.js";
-import { isUncertain, pushUndo, sendAcceptance, takeBack } from "./decisions.js";
+import { isAccepted, isUncertain, reconsider, sendAcceptance, undoable } from "./decisions.js";
 import { isFollowed, selectAndReveal } from "./selection.js";
 
 /** @typedef {import("../link/messages.js").PagePoint} PagePoint */
@@ -168,10 +168,9 @@ function stateOf(key) {
 }
 
 /** Leave a place as it is: nothing is cut there. @param {Item} item */
-export async function leavePlace(item) {
-  const done = await sendLeft(item, true);
-  if (done) pushUndo(text("review.undo_place", { vine: item.vine, spur: item.spur }), () => sendLeft(item, false), item.key);
-  return done;
+export function leavePlace(item) {
+  const words = () => text("review.undo_place", { vine: item.vine, spur: item.spur });
+  return undoable(sendLeft(item, true), words, () => sendLeft(item, false), item.key);
 }
 
 /**
@@ -200,22 +199,41 @@ export function ofVine(vine) {
  *
  * @param {readonly PagePoint[]} rows
  */
-export async function acceptAll(rows) {
-  const done = await Promise.all(rows.map((row) => whileSent(keyOfPoint(row), sendAcceptance(row))));
-  const accepted = rows.filter((_, k) => done[k]);
-  if (accepted.length > 0) pushUndo(counted("undo.accepted", accepted.length), () => takeBack(accepted));
+export function acceptAll(rows) {
+  const stands = (/** @type {PagePoint} */ row) => isAccepted(itemOf(keyOfPoint(row))?.row ?? undefined);
+  return decideAll(rows, "undo.accepted", keyOfPoint, sendAcceptance, stands, reconsider);
 }
 
 /** Leave places as they are; one undo takes all back. @param {readonly Item[]} places */
-export async function leaveAll(places) {
-  const done = await Promise.all(places.map((item) => whileSent(item.key, sendLeft(item, true))));
-  const left = places.filter((_, k) => done[k]);
-  if (left.length === 0) return;
-  pushUndo(counted("undo.left", left.length), async () => {
-    const still = left.filter(({ key }) => itemOf(key)?.status === "left");
-    const back = await Promise.all(still.map((item) => sendLeft(item, false)));
-    return back.every(Boolean);
-  });
+export function leaveAll(places) {
+  const stands = (/** @type {Item} */ { key }) => itemOf(key)?.status === "left";
+  return decideAll(places, "undo.left", ({ key }) => key, (item) => sendLeft(item, true), stands, (item) => sendLeft(item, false));
+}
+
+/**
+ * The undo leaves alone what was cut or decided again since. What the robot has not told of yet still stands.
+ *
+ * @template T
+ * @param {readonly T[]} all
+ * @param {string} words
+ * @param {(each: T) => string} keyOf
+ * @param {(each: T) => Promise<boolean>} decide
+ * @param {(each: T) => boolean} stands
+ * @param {(each: T) => Promise<boolean>} back
+ */
+async function decideAll(all, words, keyOf, decide, stands, back) {
+  /** @type {T[]} */
+  const done = [];
+  const send = async (/** @type {T} */ each) => {
+    if (await whileSent(keyOf(each), decide(each))) done.push(each);
+  };
+  const takeBack = async () => {
+    const still = done.filter((each) => isSent(keyOf(each)) || stands(each));
+    const taken = await Promise.all(still.map(back));
+    return taken.length > 0 && taken.every(Boolean);
+  };
+  const sent = Promise.all(all.map(send)).then(() => done.length > 0);
+  await undoable(sent, () => counted(words, done.length || all.length), takeBack);
 }
 
 // A point that is chosen anywhere is looked at. The work does not take a picture away under a press.
