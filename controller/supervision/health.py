@@ -149,7 +149,7 @@ def check(mode: Mode, moving: bool, health: Health, config: SupervisionConfig) -
         return Verdict("protect", why)
     why = supervision(health, config, teleoperated=mode == "TELEOP")
     if why is None and mode == "AUTO":
-        why = perception(health, config, config.picture_wait_s)
+        why = perception(health, config)
     if why is not None:
         return Verdict("pause", why)
     if mode == "AUTO" and health.obstacles > config.obstacles_max_age_s:
@@ -193,15 +193,9 @@ def supervision(health: Health, config: SupervisionConfig, teleoperated: bool) -
     return _process("server", health.server, allowed, health.present)
 
 
-def perception(health: Health, config: SupervisionConfig, waited_s: float = 0.0) -> Reason | None:
-    """Reason why perception's state forbids automatic work; None if it allows it.
-
-    Args:
-        health: Of the inputs.
-        config: Age limits.
-        waited_s: What a robot that stands waits for a frame beyond the limit of its age (s).
-    """
-    if health.obstacles > config.obstacles_max_age_s + waited_s:
+def perception(health: Health, config: SupervisionConfig) -> Reason | None:
+    """Reason why perception's state forbids automatic work; None if it allows it, if only to stand and wait for a frame."""
+    if health.obstacles > config.obstacles_max_age_s + config.picture_wait_s:
         return _stale(reasons.obstacles_stale, health.obstacles, config.obstacles_max_age_s, topics.OBSTACLES.name)
     why = _process("perception", health.perception, config.perception_max_age_s, health.present)
     return why or health.lost

@@ -156,6 +156,24 @@ def test_a_survey_stands_without_a_new_picture_and_takes_that_for_no_obstacle():
     assert r.q[0] > 0.95 and r.state.reason.code == "survey_blind"
 
 
+def test_work_that_is_started_with_too_old_a_picture_begins_with_a_newer_one():
+    r = robot()
+    r.step()
+    r.show((point("p0", (0.2, 0.75, 1.05)),))
+    r.step()
+    assert r.ask(intents.Arm(user="ada")).ok and r.ask(intents.AcceptAll(user="ada")).ok
+    without_pictures(r, 1.0)
+    assert r.ask(intents.Start(user="ada")).ok
+    r.run(0.1)
+    before = len(r.record)
+    r.run(5.0)
+    assert r.state.mode == "AUTO" and r.state.reason == WAITS
+    assert np.abs(np.array(r.record[before:])).max() < 1e-3
+    r.deaf.clear()
+    finish(r, 60.0)
+    assert entry(r, "p0").state == "DONE"
+
+
 def test_a_picture_that_does_not_come_pauses_the_work():
     r = working((point("p0", (0.2, 0.75, 1.05)),))
     run_until(r, lambda s: s is not None and s.phase == "APPROACH", 5.0)

@@ -144,6 +144,22 @@ def test_it_sums_up_and_tells_who_accepted_what_was_refused_and_what_is_left(pag
     expect(page.locator('a[download="report.json"]')).to_have_attribute("href", "api/report")
 
 
+def test_what_a_person_left_as_it_is_is_listed_with_the_reason(page: Page, server: PlayedServer) -> None:
+    open_screen(page, "report")
+    kept = page.locator('[data-section="kept"]')
+    expect(kept).to_be_hidden()
+    server.points = (
+        point(1, "PROPOSED"),
+        point(2, "REJECTED", spur=2, user="Ada", reason=reasons.said("a tie is there")),
+    )
+    place = m.UndecidedSite(reasons.wire_near_cut(6.0), "nothing", 1, 5, (1.4, 0.8, 0.9))
+    server.undecided_sites = (place,)
+    server.tell(server.page_points())
+    expect(kept.locator("li")).to_have_text(
+        ["Vine 1 · spur 2 – Ada – a tie is there", f"Vine 1 · spur 5 – {reasons.text_of(place.reason)}"]
+    )
+
+
 def test_it_is_filtered_by_vine_and_outcome(page: Page, server: PlayedServer) -> None:
     server.report = report(cut(1), cut(2, "UNKNOWN"), cut(3, vine=2), cut(4, "UNKNOWN", vine=2, wrong_by="Eve"))
     open_screen(page, "report")

@@ -8,8 +8,7 @@ import { counted, labelOf, text } from "../js/state/texts.js";
 import { element, setAttribute, setText } from "../js/views/dom.js";
 import { icon } from "../js/views/icons.js";
 import { menu } from "../js/views/menu.js";
-import { openHelp, openSettings } from "../js/views/sheets.js";
-import "./rp-invite.js";
+import { fetched, openHelp, openSettings } from "../js/views/sheets.js";
 
 class RpPerson extends HTMLElement {
   connectedCallback() {
@@ -23,6 +22,7 @@ class RpPerson extends HTMLElement {
     const list = element("div", { id: "person-menu", class: "menu" }, role, invite, settings, help, leave);
     this.append(open, list);
     const show = menu(open, list);
+    open.addEventListener("click", () => void fetched(import("./rp-invite.js"), () => {}));
     for (const [button, opens] of /** @type {const} */ ([[settings, openSettings], [help, openHelp]])) {
       button.addEventListener("click", () => {
         show(false);

@@ -1,7 +1,9 @@
-// The session's report: every cut with its pictures, sums, the timeline, refusals and what is left for a person. It prints.
+// The session's report: every cut with its pictures, sums, the timeline, refusals, what is left for a person and what a person
+// left as it is. It prints.
 
 import { whyNot } from "../js/control/allowed.js";
 import { judge } from "../js/control/decisions.js";
+import { items } from "../js/control/review.js";
 import { reasonIn } from "../js/link/api.js";
 import { clockWords, dateWords, decimal, spanWords } from "../js/state/format.js";
 import { points } from "../js/state/page-state.js";
@@ -38,6 +40,8 @@ class RpReport extends HTMLElement {
   found = element("p", { class: "hint", attributes: { role: "status" } });
   cuts = element("ol", { class: "cut-cards" });
   left = element("ul", { class: "left-over" });
+  kept = element("ul", { class: "left-as-it-is" });
+  keptSection = section("kept", this.kept);
   vines = table("vines", ["vine", "done", "not_cut", "unknown", "unreachable", "minutes"]);
   refusals = table("refusals", ["when", "who", "asked", "why"]);
   control = table("control", ["when", "who", "what"]);
@@ -63,6 +67,7 @@ class RpReport extends HTMLElement {
       section("timeline", this.timeline),
       section("cuts", filters, this.found, this.cuts),
       section("left", this.left),
+      this.keptSection,
       this.vines.box,
       this.refusals.box,
       this.control.box,
@@ -70,7 +75,10 @@ class RpReport extends HTMLElement {
     for (const filter of [this.vine, this.outcome]) filter.addEventListener("change", () => this.filter());
     drawOn([screen], () => this.timeline.open(screen.get() === "report"));
     whileOpen("report", AGAIN_MS, () => this.fetch());
-    drawOn([points], () => this.drawLeft());
+    drawOn([points], () => {
+      this.drawLeft();
+      this.drawKept();
+    });
   }
 
   async fetch() {
@@ -258,10 +266,30 @@ class RpReport extends HTMLElement {
       // What has no vine is of the whole picture.
       .map((site) => (site.vine === 0 ? reasonText(site.reason) : line("undecided", site.vine, site.spur, site.reason)));
     const lines = [...rows, ...sites];
-    const words = lines.length > 0 ? lines : [text("report.none.left")];
-    if (words.map(joined).join("\n") === [...this.left.children].map((item) => item.textContent).join("\n")) return;
-    this.left.replaceChildren(...words.map((each) => element("li", { text: each })));
+    fill(this.left, lines.length > 0 ? lines : [text("report.none.left")]);
   }
+
+  /** What a person has decided to leave: of a place it is not known who. */
+  drawKept() {
+    const left = items().filter(({ status }) => status === "left");
+    this.keptSection.hidden = left.length === 0;
+    fill(
+      this.kept,
+      left.map(({ vine, spur, row, sites }) => {
+        const why = row ? [row.entry.user, reasonText(row.entry.reason)] : sites.map((site) => reasonText(site.reason));
+        return [text("report.place", { vine, spur }), ...why.filter(Boolean)].join(" – ");
+      }),
+    );
+  }
+}
+
+/**
+ * @param {HTMLElement} box
+ * @param {readonly string[]} lines
+ */
+function fill(box, lines) {
+  if (lines.map(joined).join("\n") === [...box.children].map((item) => item.textContent).join("\n")) return;
+  box.replaceChildren(...lines.map((each) => element("li", { text: each })));
 }
 
 /**

@@ -22,11 +22,13 @@ export function initSheets(target) {
 }
 
 /**
+ * Use a module once it is there, or say that it cannot be had.
+ *
  * @template T
  * @param {Promise<T>} module
  * @param {(module: T) => void} show
  */
-async function fetched(module, show) {
+export async function fetched(module, show) {
   try {
     show(await module);
   } catch {
