@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Page, Route, expect
 
 from rolling_panda import reasons
 from rolling_panda.messages import page as p
@@ -114,6 +114,17 @@ def test_a_refusal_is_a_notice_and_a_line_of_the_log(page: Page, server: PlayedS
     expect(page.locator("#log li").last).to_be_visible()
     page.locator("#log-filter").select_option("error")
     expect(page.locator("#log li").last).to_be_hidden()
+
+
+def test_a_pressed_step_shows_it_until_the_robot_has_answered(page: Page, server: PlayedServer) -> None:
+    held: list[Route] = []
+    page.route("**/api/start", lambda route: held.append(route), times=1)
+    start = page.locator("#start")
+    start.click()
+    expect(start).to_have_attribute("aria-busy", "true")
+    until(page, lambda: len(held) == 1)
+    held[0].continue_()
+    expect(start).not_to_have_attribute("aria-busy", "true")
 
 
 def test_space_stops_even_on_a_focused_button_and_inside_the_view(page: Page, server: PlayedServer) -> None:

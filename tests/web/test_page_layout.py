@@ -160,6 +160,7 @@ def test_the_page_is_small_and_keeps_to_its_own_files() -> None:
         "rp-preview.js",
         "rp-replay.js",
         "rp-robots.js",
+        "rp-invite.js",
     ]
     later = set[Path](folder / "components" / name for name in opened) | {folder / "js/control/lease-worker.js"}
     later |= {folder / "js" / "views" / name for name in ("settings-sheet.js", "help-sheet.js", "hints.js")}

@@ -105,7 +105,7 @@ function newRow(reason) {
   const words = element("strong");
   const act = element("span", { class: "act" });
   const since = element("time", { text: clockWords(Date.now() / 1000), attributes: { title: text("alarms.since") } });
-  const press = element("button", { class: "alarm-press", onclick: () => step && take(step) });
+  const press = element("button", { class: "alarm-press", onclick: () => void (step && take(step)) });
   const row = element(
     "li",
     { data: { severity, code: reason.code } },

@@ -12,7 +12,7 @@ import { reasonText } from "../js/state/reasons.js";
 import { screen } from "../js/state/screens.js";
 import { drawOn } from "../js/state/signals.js";
 import { counted, text } from "../js/state/texts.js";
-import { dropDown, element, setEnabled, setText } from "../js/views/dom.js";
+import { dropDown, element, setAttribute, setEnabled, setText } from "../js/views/dom.js";
 import { icon } from "../js/views/icons.js";
 import { menu } from "../js/views/menu.js";
 
@@ -75,7 +75,7 @@ class RpBar extends HTMLElement {
     const label = element("span");
     const duration = element("span", { class: "duration" });
     const id = isCommand(name) ? name.toLowerCase() : `to-${name}`;
-    const button = element("button", { id, onclick: () => take(name) }, icon(ICONS[name] ?? name), element("span", {}, label, duration));
+    const button = element("button", { id, onclick: () => void busyWhile(button, take(name)) }, icon(ICONS[name] ?? name), element("span", {}, label, duration));
     const box = element("div", { class: "step" }, button);
     this.steps.set(name, { box, button, label, duration });
     this.more.append(box);
@@ -105,6 +105,18 @@ class RpBar extends HTMLElement {
     }
     this.none.hidden = left > 0;
   }
+}
+
+/**
+ * Until the robot has answered, the button shows that it was pressed.
+ *
+ * @param {Element} button
+ * @param {Promise<void>} taken
+ */
+async function busyWhile(button, taken) {
+  setAttribute(button, "aria-busy", "true");
+  await taken;
+  setAttribute(button, "aria-busy", "");
 }
 
 async function fetchPreview() {

@@ -34,7 +34,7 @@ class RpCalibration extends HTMLElement {
       element("button", { id, text: text(`command.${command}`), onclick: act });
     const check = button("check-camera", "CheckCamera", () => void ask(text("command.CheckCamera"), "api/camera/check"));
     const calibrate = button("calibrate-camera", "CalibrateCamera", () => void ask(text("command.CalibrateCamera"), "api/camera/calibrate"));
-    const use = button("use-camera", "UseCamera", () => take("calibration"));
+    const use = button("use-camera", "UseCamera", () => void take("calibration"));
     const measure = button("calibrate-base", "CalibrateBase", () => void ask(text("command.CalibrateBase"), "api/base/calibrate"));
     const useBase = button("use-base", "UseBase", () => {
       const base = this.robot.get()?.base;

@@ -30,11 +30,11 @@ export function whyNotStep(step) {
   return isCommand(step) ? whyNot(step) : null;
 }
 
-/** @param {Step} step */
-export function take(step) {
+/** Do it; over when the robot has answered. @param {Step} step */
+export async function take(step) {
   switch (step) {
     case "continue":
-      void ask(text("command.Resume"), "api/continue");
+      await ask(text("command.Resume"), "api/continue");
       break;
     case "review":
       openScreen("review");
@@ -43,16 +43,16 @@ export function take(step) {
       openPreview();
       break;
     case "approve":
-      void approvePreview();
+      await approvePreview();
       break;
     case "calibration":
-      void useCalibration();
+      await useCalibration();
       break;
     case "reset":
       document.getElementById("reset-reason")?.focus();
       break;
     default:
-      void ask(text(`command.${step}`), `api/${step.toLowerCase()}`, step === "Survey" ? { distance: surveyDistance.get() } : {});
+      await ask(text(`command.${step}`), `api/${step.toLowerCase()}`, step === "Survey" ? { distance: surveyDistance.get() } : {});
   }
 }
 
@@ -60,5 +60,5 @@ export function take(step) {
 async function useCalibration() {
   /** @type {CameraState|null} */
   const camera = await fetchJson("api/camera");
-  if (camera?.offer) void ask(text("command.UseCamera"), "api/camera/use", { made_at: camera.offer.made_at });
+  if (camera?.offer) await ask(text("command.UseCamera"), "api/camera/use", { made_at: camera.offer.made_at });
 }
