@@ -194,7 +194,7 @@ def supervision(health: Health, config: SupervisionConfig, teleoperated: bool) -
 
 
 def perception(health: Health, config: SupervisionConfig) -> Reason | None:
-    """Reason why perception's state forbids automatic work; None if it allows it, if only to stand and wait for a frame."""
+    """Reason why perception's state forbids automatic work; None if it allows it, even if only to wait for a frame."""
     if health.obstacles > config.obstacles_max_age_s + config.picture_wait_s:
         return _stale(reasons.obstacles_stale, health.obstacles, config.obstacles_max_age_s, topics.OBSTACLES.name)
     why = _process("perception", health.perception, config.perception_max_age_s, health.present)
