@@ -2812,6 +2812,16 @@ def cut_and_gone() -> None:
     """Cut, and the wood is off."""
 
 
+@_reason("warning", "pull it out of the wires by hand")
+def cut_and_hangs(aside_mm: float) -> None:
+    """Cut; the cane has not fallen: it hangs {aside_mm:.0f} mm beside the cut."""
+
+
+@_reason("error", "look")
+def beside_but(report: Reason, aside_mm: float) -> None:
+    """{report}, but its cane is seen {aside_mm:.0f} mm beside the cut."""
+
+
 @_reason("error", "look")
 def gone_but(report: Reason) -> None:
     """{report}, but the wood beyond is gone."""

@@ -47,6 +47,16 @@ class Cut:
     past_best: float | None = None
 
     @property
+    def bitten(self) -> bool:
+        """The blades closed for it."""
+        return self.tool_error is not None
+
+    @property
+    def told_truly(self) -> bool:
+        """Told as cut where something was severed, and as not cut where nothing was."""
+        return self.state == ("FAILED_NOT_CUT" if self.distance is None else "DONE")
+
+    @property
     def right(self) -> bool:
         """Severed at the right place."""
         return self.distance is not None and self.distance <= RIGHT_PLACE

@@ -75,6 +75,8 @@ def summarise(runs: Sequence[RowRun]) -> dict[str, Figure]:
     cuts = [cut for run in runs for cut in run.cuts]
     made = [cut for cut in cuts if cut.past_best is not None or cut.harm]
     ends = [cut.nodes_left for cut in made if cut.nodes_left is not None]
+    bitten = [cut for cut in cuts if cut.bitten]
+    settled = [cut for cut in bitten if cut.state in ("DONE", "FAILED_NOT_CUT")]
     past = [abs(cut.past_best) for cut in made if cut.past_best is not None]
 
     def of(hits: Sequence[Cut]) -> Figure:
@@ -89,6 +91,8 @@ def summarise(runs: Sequence[RowRun]) -> dict[str, Figure]:
         "void": of([cut for cut in cuts if cut.state == "PROPOSED"]),
         "refused": of([cut for cut in cuts if cut.state in ("UNREACHABLE", "FAILED_NOT_CUT")]),
         "unknown": of([cut for cut in cuts if cut.state == "UNKNOWN"]),
+        "told_falsely": share(sum(not cut.told_truly for cut in settled), len(bitten)),
+        "asked_of_person": share(sum(cut.state == "UNKNOWN" for cut in bitten), len(bitten)),
         "from_best_m_median": quantile(past, 0.5),
         "from_best_m_p95": quantile(past, 0.95),
         "rows_with_contact": share(sum(run.contacts + run.self_contacts > 0 for run in runs), len(runs)),
@@ -190,6 +194,8 @@ def main(argv: Sequence[str]) -> int:
         print(
             f"  right {told(figures['right'])}; of cuts made {told(figures['right_of_made'])}; "
             f"void {told(figures['void'])}; harmed {told(figures['harmed'])}\n"
+            f"  of bites: outcome told falsely {told(figures['told_falsely'])}, "
+            f"asked of a person {told(figures['asked_of_person'])}\n"
             f"  {told_stops(work)}",
             flush=True,
         )

@@ -1,11 +1,14 @@
 """Close-up pictures of points, and what they decide before and after a cut.
 
 After a cut the cutter reports whether the blades met resistance, and the camera whether the wood beyond is gone. If
-both report an intact cane, it is cut once more. If they contradict each other, an operator decides.
+both report an intact cane, it is cut once more. If they contradict each other, an operator decides. A cane that the
+camera sees beside the cut, rather than in it, was severed and hangs.
 """
 
 import math
 from dataclasses import dataclass
+
+import numpy as np
 
 from controller.config import WorkConfig
 from controller.motion.follower import Measured
@@ -15,6 +18,7 @@ from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.messages.perception import CloseUpResult, Finding, PruningPoint
 from rolling_panda.messages.types import Outcome, PointState, Reason
+from rolling_panda.model.differential_drive import Array
 
 #: A request is repeated this often until its picture has come (s).
 _REPEAT_S = 0.05
@@ -109,16 +113,18 @@ class CloseUpClient:
 
 #: Time limit for the request of a close-up after a cut (s); after it the cutter's report counts.
 _REQUEST_WITHIN_S = 4.0
+#: A cane that stands is seen within this of where the blades closed (m): what camera and arm err, and what it sways.
+_STANDS_WITHIN = 0.012
 
 
 @dataclass
 class _Ended:
-    """A cut that ended: the cutter's report, its time, and whether a close-up was requested."""
+    """A cut that ended: the cutter's report, its time, and where the blades were, once a close-up is requested."""
 
     outcome: Outcome
     report: Reason
     since: float
-    requested: bool = False
+    place: Array | None = None
 
 
 class PostCutCheck:
@@ -148,25 +154,28 @@ class PostCutCheck:
             return
         self._ended[point_id] = _Ended(outcome, report, now)
 
-    def request_close_up(self, point_id: str, now: float) -> None:
-        """The camera sees the place now; requests one close-up."""
+    def request_close_up(self, point_id: str, place: Array, now: float) -> None:
+        """The camera sees now where the blades closed (`place`, 3, m, odom); requests one close-up."""
         ended = self._ended.get(point_id)
-        if ended is not None and not ended.requested:
-            ended.requested = True
+        if ended is not None and ended.place is None:
+            ended.place = place
             self._close_ups.ask(point_id, "severed", now)
 
     def step(self, now: float) -> list[Reason]:
         """Decide the cuts that can be decided; returns what is logged."""
         said = []
         for point_id, ended in list(self._ended.items()):
-            close_up = self._close_ups.answer(point_id, now) if ended.requested else None
+            if ended.place is None:
+                if now - ended.since > _REQUEST_WITHIN_S:
+                    said.append(self._settle(point_id, ended, "unseen", reasons.robot_left()))
+                continue
+            close_up = self._close_ups.answer(point_id, now)
             if close_up is not None:
-                said.append(self._settle(point_id, ended, close_up.finding, _why(close_up)))
-            elif not ended.requested and now - ended.since > _REQUEST_WITHIN_S:
-                said.append(self._settle(point_id, ended, "unseen", reasons.robot_left()))
+                aside = _aside(close_up, ended.place)
+                said.append(self._settle(point_id, ended, close_up.finding, _why(close_up), aside))
         return said
 
-    def _settle(self, point_id: str, ended: _Ended, finding: str, why: Reason) -> Reason:
+    def _settle(self, point_id: str, ended: _Ended, finding: Finding, why: Reason, aside: float = 0.0) -> Reason:
         del self._ended[point_id]
         self._close_ups.forget(point_id)
         done = ended.outcome == "DONE"
@@ -176,6 +185,10 @@ class PostCutCheck:
             return self._end(point_id, "UNKNOWN", reasons.gone_but(ended.report))
         if finding == "unseen":
             return self._end(point_id, ended.outcome or "UNKNOWN", reasons.unseen_after(ended.report, why))
+        if aside > _STANDS_WITHIN:
+            if done:
+                return self._end(point_id, "DONE", reasons.cut_and_hangs(1e3 * aside))
+            return self._end(point_id, "UNKNOWN", reasons.beside_but(ended.report, 1e3 * aside))
         ticket = self._queue.get(point_id)
         accepted = None if ticket is None else ticket.accepted
         if self._tried.get(point_id) is None or self._tried[point_id] is not accepted:
@@ -218,6 +231,14 @@ def not_as_accepted(close_up: CloseUpResult, ticket: Ticket | None) -> Reason | 
 
 def _why(close_up: CloseUpResult) -> Reason:
     return close_up.reason or reasons.unexplained()
+
+
+def _aside(close_up: CloseUpResult, place: Array) -> float:
+    """How far beside a place the cane is seen, across it (m); 0 where it is not seen."""
+    if close_up.position is None or close_up.tangent is None:
+        return 0.0
+    off, along = np.subtract(close_up.position, place), np.array(close_up.tangent)
+    return float(np.linalg.norm(off - along * (off @ along)))
 
 
 def camera_ready(robot: Measured, motion: ToolMotion, config: WorkConfig) -> bool:

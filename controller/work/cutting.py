@@ -221,7 +221,7 @@ class Parts:
         During the retreat, without a stop: one picture is enough to see that the wood is gone.
         """
         if math.dist(robot.kinematics.T_odom_tool.translation, self.cut_at) > self.config.work.close_up_from:
-            self.post_cut_check.request_close_up(self.cut_point, now)
+            self.post_cut_check.request_close_up(self.cut_point, self.cut_at, now)
 
     def refine(self, point_id: str, motion: ToolMotion, frame: MapFrame) -> None:
         """Correct a motion to the newest, more accurate position of its point."""

@@ -53,6 +53,16 @@ def test_shares_are_of_the_accepted_and_of_the_cuts_that_were_made() -> None:
     assert low is not None and high is not None and low < 3 / 7 < high
 
 
+def test_outcomes_are_held_against_what_was_severed() -> None:
+    severed, missed = replace(cut(), tool_error=0.001, distance=0.001), replace(cut(), tool_error=0.001, distance=None)
+    told_not_cut = replace(severed, state="FAILED_NOT_CUT")
+    asked, never = replace(severed, state="UNKNOWN"), cut("FAILED_NOT_CUT", False, past=None)
+    rightly_not = replace(missed, state="FAILED_NOT_CUT")
+    figures = bench.summarise([run(severed, missed, told_not_cut, asked, rightly_not, never)])
+    assert (figures["told_falsely"].value, figures["told_falsely"].n) == (pytest.approx(2 / 5), 5)
+    assert figures["asked_of_person"].value == pytest.approx(1 / 5)
+
+
 def test_minutes_of_work_for_a_stop_are_told_beside_the_times_a_person_came() -> None:
     work = bench.work_of([replace(run(cut()), stops=1, cleared=2, auto_s=90.0), replace(run(cut()), auto_s=210.0)])
     assert work == bench.Work(minutes=5.0, stops=1, stops_cleared=2)

@@ -1,6 +1,7 @@
 """Camera checks before and after a cut."""
 
 import msgspec
+import numpy as np
 import pytest
 
 from controller.work.close_up import CloseUpClient, PostCutCheck, not_as_accepted
@@ -24,19 +25,22 @@ class Work:
         assert self.queue.accept("a", 1, "ada") is None
         self.now, self.number = 0.0, 0
 
-    def cut(self, outcome: m.Outcome, finding: Finding | None) -> str:
-        """One try; the state afterwards."""
+    def cut(self, outcome: m.Outcome, finding: Finding | None, aside: float = 0.0) -> str:
+        """One try; the state afterwards. The cane is seen `aside` (m) of the cut, if it is."""
         self.queue.begin_cut("a", "c")
         self.check.start("a", outcome, REPORTS[outcome], self.now)
         assert self.state in ("CUTTING", outcome)
         self.now += 0.5
         if finding is not None:
-            self.check.request_close_up("a", self.now)
+            self.check.request_close_up("a", np.array([0.0, 0.0, 1.0]), self.now)
             due = self.client.due(self.now)
             if due is not None:
                 look = CloseUpResult(
                     header=m.Header(), point_id="a", number=due[0], finding=finding, reason=reasons.cane_hidden()
                 )
+                if finding == "seen":
+                    # Along its cane a cut is seen now here, now there.
+                    look = msgspec.structs.replace(look, position=(aside, 0.0, 1.02), tangent=(0.0, 0.0, 1.0))
                 self.client.update(look, self.now)
         else:
             self.now += 5.0
@@ -87,6 +91,19 @@ def test_what_stands_is_cut_once_more_and_no_third_time(second: m.Outcome, state
     assert work.cut("FAILED_NOT_CUT", "seen") == "ACCEPTED"
     assert work.ticket.accepted is accepted and work.ticket.reason.code == "stands_cut_again"
     assert work.cut(second, "seen") == state and work.ticket.reason.code in ("stands_unknown", "stands_not_cut")
+
+
+def test_a_cane_that_is_seen_beside_the_cut_hangs_and_is_not_cut_again() -> None:
+    work = Work()
+    assert work.cut("DONE", "seen", 0.02) == "DONE" and work.ticket.reason == reasons.cut_and_hangs(20.0)
+    swaying = Work()
+    assert swaying.cut("DONE", "seen", 0.01) == "ACCEPTED"
+
+
+def test_a_cane_beside_the_cut_that_the_blades_have_not_cut_is_for_a_person_to_look_at() -> None:
+    work = Work()
+    assert work.cut("FAILED_NOT_CUT", "seen", 0.02) == "UNKNOWN"
+    assert work.ticket.reason == reasons.beside_but(REPORTS["FAILED_NOT_CUT"], 20.0)
 
 
 def test_an_unknown_outcome_is_never_tried_again_and_not_even_looked_at() -> None:
@@ -166,6 +183,22 @@ def test_the_place_of_the_close_up_is_cut_and_the_log_says_how_far_it_is_from_th
     assert entry(r, "a").state == "DONE"
     assert abs(r.cuts[0][1][0, 3] - 0.5 - dx) < 0.0015
     assert any("a is cut 20 mm from where it was accepted" in event for event in r.events) is told
+
+
+def test_the_robot_does_not_go_back_for_a_severed_cane_that_hangs_beside_its_stub():
+    r = working((point("a", (0.5, 0.75, 1.0)), point("b", (0.8, 0.75, 1.05))))
+    usual = r.close_up
+
+    def hanging(request):
+        found = usual(request)
+        if request.point_id == "a" and found.finding == "severed":
+            return msgspec.structs.replace(found, finding="seen", position=(0.52, 0.75, 0.98), tangent=(0.0, 0.0, 1.0))
+        return found
+
+    r.close_up = hanging
+    finish(r, 60.0)
+    assert [cut[0] for cut in r.cuts] == ["a", "b"]
+    assert entry(r, "a").state == "DONE" and entry(r, "a").reason.code == "cut_and_hangs"
 
 
 def test_the_phase_is_told_while_the_robot_looks_and_the_blades_stay_out_of_the_canes():

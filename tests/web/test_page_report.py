@@ -114,6 +114,7 @@ def test_it_sums_up_and_tells_who_accepted_what_was_refused_and_what_is_left(pag
     server.points = (
         point(1, "DONE", cut_id="c1"),
         point(2, "UNKNOWN", spur=2, reason=reasons.interrupted()),
+        point(4, "DONE", spur=4, cut_id="c4", reason=reasons.cut_and_hangs(21.0)),
         point(3, "UNREACHABLE", spur=3, user="Ada", reason=reasons.control_held("Ada")),
         point(5, "PROPOSED", vine=2, spur=5),
     )
@@ -132,6 +133,7 @@ def test_it_sums_up_and_tells_who_accepted_what_was_refused_and_what_is_left(pag
     assert "2027" in sum_of(page, "date")
     expect(page.locator(".left-over li")).to_have_text(
         [
+            "Vine 1 · spur 4: cut, but it hangs: pull it out",
             re.compile(r"Vine 1\s· spur 2: look whether it was cut – "),
             re.compile(r"Vine 1\s· spur 3: out of the robot's reach – "),
             "Vine 2 · spur 5: no decision yet",

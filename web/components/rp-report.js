@@ -255,9 +255,12 @@ class RpReport extends HTMLElement {
     return button;
   }
 
-  /** What a person has to look at: cuts with an unknown outcome, points out of reach or without a decision, and places. */
+  /** What is left to do: canes that hang, cuts with an unknown outcome, points out of reach or without a decision, places. */
   drawLeft() {
     const page = points.get();
+    const hanging = (page?.points ?? [])
+      .filter(({ entry }) => entry.reason?.code === "cut_and_hangs")
+      .map(({ point }) => line("DONE", point.vine, point.spur, null));
     const rows = (page?.points ?? [])
       .filter(({ entry }) => entry.state === "UNKNOWN" || entry.state === "UNREACHABLE" || entry.state === "PROPOSED")
       .map(({ point, entry }) => line(entry.state, point.vine, point.spur, entry.state === "PROPOSED" ? null : entry.reason));
@@ -265,7 +268,7 @@ class RpReport extends HTMLElement {
       .filter((site) => site.needs === "operator")
       // What has no vine is of the whole picture.
       .map((site) => (site.vine === 0 ? reasonText(site.reason) : line("undecided", site.vine, site.spur, site.reason)));
-    const lines = [...rows, ...sites];
+    const lines = [...hanging, ...rows, ...sites];
     fill(this.left, lines.length > 0 ? lines : [text("report.none.left")]);
   }
 
