@@ -28,8 +28,6 @@ class Surroundings:
         self._canes: tuple[Capsule, ...] = ()
         self._cane_obstacles: tuple[Obstacle, ...] = ()
         self._axes = Axes(())
-        #: Canes that the blades may touch.
-        self.touchable: tuple[Obstacle, ...] = ()
 
     def update(self, obstacles: Received[Obstacles] | None) -> None:
         """Take the newest message; one that was taken before costs nothing."""
@@ -57,10 +55,14 @@ class Surroundings:
         self._places = places
         self._allow()
 
+    def canes_near(self, place: Array, within: float) -> tuple[tuple[Capsule, Obstacle], ...]:
+        """Canes that stay, or may stay, whose bark is within a distance (m) of a place (3, m, odom)."""
+        gaps = self._axes.gaps(place[None], np.zeros(1))[0]
+        return tuple((self._canes[index], self._cane_obstacles[index]) for index in np.flatnonzero(gaps < within))
+
     def _allow(self) -> None:
         found = touchable(self._canes, self._axes, self._places)
-        self.touchable = tuple(self._cane_obstacles[index] for index in sorted(found))
-        self.model.allow({cane.name for cane in self.touchable})
+        self.model.allow({self._cane_obstacles[index].name for index in found})
 
 
 def touchable(canes: Sequence[Capsule], axes: Axes, places: Sequence[Array]) -> set[int]:

@@ -85,8 +85,8 @@ class CutPlanner:
         cuts: dict[str, CutPlan] = {}
         refused: dict[str, Reason] = {}
         for point in request.points:
-            name, position, tangent = point.point_id, np.array(point.position), np.array(point.tangent)
-            found = completed(self._search.find(position, tangent, request.q, turned.get(name), point.kind))
+            name = point.point_id
+            found = completed(self._search.find(point, request.q, turned.get(name)))
             if isinstance(found, CutPlan):
                 cuts[name] = found
             else:

@@ -24,7 +24,7 @@ from controller.whole_body.collision_geometry import BLADES
 from controller.work.point_queue import PointQueue, Ticket
 from rolling_panda import reasons
 from rolling_panda.errors import InputError
-from rolling_panda.messages.perception import Obstacles, PruningPoint
+from rolling_panda.messages.perception import Capsule, Obstacles, PruningPoint
 from rolling_panda.messages.types import CutKind, Reason
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.map_frame import MapFrame
@@ -217,7 +217,7 @@ class PostureSearch:
         config: WorkConfig,
         joint_margin: float,
         too_near: Callable[[CutPlan], tuple[float, Reason | None]] = lambda _: (0.0, None),
-        tool_too_near: Callable[[CutPoses, CutKind], tuple[float, Reason | None]] = lambda *_: (0.0, None),
+        tool_too_near: Callable[[CutPoses, PruningPoint], tuple[float, Reason | None]] = lambda *_: (0.0, None),
     ) -> None:
         """Remember the model and the row's direction.
 
@@ -227,7 +227,7 @@ class PostureSearch:
             joint_margin: Distance from every joint limit (rad).
             too_near: How much of a required distance a plan lacks (m), with its place and parts; None if it lacks none.
                 Another plan is not returned.
-            tool_too_near: The same for the tool alone at the poses of a cut of a kind, where no posture helps.
+            tool_too_near: The same for the tool alone at the poses of a cut of a point, where no posture helps.
         """
         self._robot, self._config, self._too_near, self._tool_too_near = robot, config, too_near, tool_too_near
         c, s = np.cos(config.row_heading), np.sin(config.row_heading)
@@ -243,22 +243,16 @@ class PostureSearch:
         self._upper = robot.limits.upper[ARM_Q] - margin
 
     def find(
-        self,
-        position: Array,
-        tangent: Array,
-        q: Array,
-        azimuth: float | None = None,
-        kind: CutKind = "spur cut",
+        self, point: PruningPoint, q: Array, azimuth: float | None = None
     ) -> Generator[None, None, CutPlan | Unreachable]:
         """Search, yielding once an iteration.
 
         Args:
-            position: Position of the cut (3, m, map).
-            tangent: Unit vector along the cane (3, map).
-            q: Current configuration (12): the base keeps its distance to the row.
+            point: The cut.
+            q: Current configuration (12, map): the base keeps its distance to the row.
             azimuth: Turn of the approach about the cane (rad) set by a person; None leaves it to the search.
-            kind: What the cut is for.
         """
+        position, tangent = np.array(point.position), np.array(point.tangent)
         best: CutPlan | None = None
         passed_over: list[tuple[float, Reason]] = []
         seeds = (np.array(self._config.reach), np.array(self._config.home))
@@ -266,7 +260,7 @@ class PostureSearch:
         lateral = float(base @ self._left)
         config = self._config
         usual = len(APPROACHES if azimuth is None else TILTS)
-        for tried, approach in enumerate(approaches(azimuth, kind)):
+        for tried, approach in enumerate(approaches(azimuth, point.kind)):
             # More approaches help where something is in the way, not where the arm does not get there.
             if tried == usual and not passed_over:
                 break
@@ -274,7 +268,7 @@ class PostureSearch:
                 poses = cut_poses(position, tangent, self._left, config.stand_off, config.clearance, *approach)
             except InputError:
                 return Unreachable(reasons.no_square_approach())
-            lacking, nearest = self._tool_too_near(poses, kind)
+            lacking, nearest = self._tool_too_near(poses, point)
             if nearest is not None:
                 passed_over.append((lacking, nearest))
                 yield
@@ -375,9 +369,11 @@ CLEARANCE = 0.02
 _ROOM = 0.003
 #: By so much a posture may miss a pose (m).
 _INEXACT = 0.0005
-#: A cane that stays is between the closing blades where its axis comes into a box around the middle of a cut, with
-#: these half sizes along the tool's axes: opening, thickness and reach of the blades with a margin (m).
+#: A cane is between the closing blades where its axis comes into a box around the middle of a cut, with these half
+#: sizes along the tool's axes: opening, thickness and reach of the blades with a margin for where it was seen (m).
 _BITE = np.array([0.020, 0.004, 0.022])
+#: No cane farther from the middle of a cut than this (m) comes into that box, with what its bark hides.
+_BESIDE = 0.05
 #: What is known of a cane begins at the bark of its stub, up to so far from the stub's axis (m).
 _HIDDEN = 0.020
 
@@ -414,21 +410,19 @@ class CutClearance:
             found.append(self._lacking(where, near.distance, near.pairs))
         return max(found, key=lambda each: each[0])
 
-    def tool_too_near(self, poses: CutPoses, kind: CutKind) -> tuple[float, Reason | None]:
+    def tool_too_near(self, poses: CutPoses, point: PruningPoint) -> tuple[float, Reason | None]:
         """The same of the tool alone, which no posture of the arm changes.
 
-        Beside a cut on a stub, a cane that stays must not be between the blades either.
+        A cane that stays, or may stay, must not be between the blades either, though they would pass it open.
 
         Args:
             poses: Of the tool.
-            kind: What the cut is for.
+            point: The cut.
         """
         if not self._settings.collisions:
             return 0.0, None
         self._surroundings.work_at((poses.cut.translation,))
-        found: list[tuple[float, Reason | None]] = [(0.0, None)]
-        if kind == "renewal cut":
-            found.append(self._bitten(poses.cut))
+        found: list[tuple[float, Reason | None]] = [(0.0, None), self._bitten(poses.cut, point)]
         places: tuple[tuple[reasons.Place, Any], ...] = (
             ("at the cut", poses.cut),
             ("at the stand-off", poses.stand_off),
@@ -453,12 +447,14 @@ class CutClearance:
                 found = reasons.too_near(where, 1e3 * distance, *pair, 1e3 * needed)
         return worst, found
 
-    def _bitten(self, T_map_tool: Any) -> tuple[float, Reason | None]:
-        """A cane that the blades may touch, but would cut as well: how far it is in (m), and the reason."""
+    def _bitten(self, T_map_tool: Any, point: PruningPoint) -> tuple[float, Reason | None]:
+        """A cane that the blades would cut as well: how far it is in (m), and the reason."""
         worst, found = 0.0, None
-        canes = self._surroundings.touchable
-        joints = {cane.end for cane in canes}
-        for cane in canes:
+        canes = self._surroundings.canes_near(T_map_tool.translation, _BESIDE)
+        joints = {cane.end for cane, _ in canes}
+        for capsule, cane in canes:
+            if _is_cut(capsule, point):
+                continue
             start, end = np.array(cane.start), np.array(cane.end)
             if cane.start not in joints:
                 start = start - _HIDDEN * (end - start) / max(float(np.linalg.norm(end - start)), 1e-9)
@@ -467,6 +463,16 @@ class CutClearance:
                 near = reasons.too_near("at the cut", 1e3 * away, BLADES, cane.name, 1e3 * (away + inside))
                 worst, found = inside, near
         return worst, found
+
+
+def _is_cut(cane: Capsule, point: PruningPoint) -> bool:
+    """Whether a cane is the one that is cut at a point; of a cut on a stub, one that goes with the stub."""
+    if (cane.vine, cane.spur) != (point.vine, point.spur):
+        return False
+    known = cane.cane >= 0 and point.cane >= 0
+    if point.kind == "renewal cut":
+        return known and cane.cane != point.cane
+    return not known or cane.cane == point.cane
 
 
 def _in_box(ends: Array) -> tuple[float, float]:
@@ -547,9 +553,8 @@ class NextCut:
             self._ticket, self.found, self._finding = ticket, self._known(ticket), None
             if self.found is not None:
                 return True
-            at, along = np.array(ticket.accepted.position), np.array(ticket.accepted.tangent)
             azimuth = self._queue.approaches.of(ticket.point.point_id)
-            self._finding = self._search.find(at, along, q, azimuth, ticket.accepted.kind)
+            self._finding = self._search.find(ticket.accepted, q, azimuth)
         return True
 
     @property

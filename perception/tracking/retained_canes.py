@@ -1,7 +1,8 @@
 """Retained canes: the parts of canes that stay after pruning, as obstacle capsules.
 
-A cane with a proposed cut is retained below the cut. The other canes of a spur with a chosen keeper are removed. On an
-undecided spur every cane may stay: each is retained up to the longest length that the rule may leave.
+A cane with a proposed cut is retained below the cut. The other canes of a spur with a chosen keeper are removed; a
+renewal cut names the keeper, too. On an undecided spur every cane may stay. Where no cut is known on a cane, it is
+retained up to the longest length that the rule may leave.
 
 A published capsule does not change until its cane is seen elsewhere, so that noise does not move it.
 """
@@ -120,23 +121,26 @@ class RetainedCanes:
             here = [proposal.cut for proposal in cuts if proposal.number == spur.number]
             canes = [self._canes.setdefault((spur.number, k), _Cane()) for k in range(len(spur.canes))]
             arcs: dict[int, float] = {}
+            chosen: set[int] = set()
             for cut in here:
                 k, gap, arc = spur.nearest_cane(cut.position)
-                # A renewal cut is on the stub, not on a cane.
-                if gap < _ON_CANE and cut.kind != "renewal cut":
+                if cut.kind == "renewal cut":
+                    # It is on the stub, and names the cane that stays on it.
+                    chosen.add(cut.cane)
+                elif gap < _ON_CANE:
                     arcs[k] = min(arc, arcs.get(k, np.inf))
                     canes[k].keeper = canes[k].keeper or cut.kind == "spur cut"
             for k, known in enumerate(spur.canes):
                 if k in arcs:
                     canes[k].cut = arcs[k]
                 elif np.isinf(known.cut_at):
-                    # The proposal was withdrawn, and the cut was not made.
-                    canes[k].cut, canes[k].keeper = np.inf, False
+                    # Without a proposal, and the cut was not made.
+                    canes[k].cut, canes[k].keeper = np.inf, k in chosen
             # A Guyot spur keeps two canes.
             decided = rule.system == "spur" and any(cane.keeper for cane in canes)
             for cane, known in zip(canes, spur.canes, strict=True):
                 cane.observations = known.base.count
-                removed = decided and np.isinf(cane.cut)
+                removed = decided and np.isinf(cane.cut) and not cane.keeper
                 confirmed = (
                     2 * cane.observations >= spur.position.count
                     and cane.observations >= self._config.min_hits + cane.gone_at
@@ -187,7 +191,9 @@ def _publish(cane: _Cane, known: KnownCane, end: float, number: SpurNumber, unde
     cane.axis, cane.radius = axis, radius
     corners = _simplify(axis)
     cane.capsules = tuple(
-        Capsule("cane", vector3(start), vector3(stop), radius, radius, number.vine, number.spur, undecided)
+        Capsule(
+            "cane", vector3(start), vector3(stop), radius, radius, number.vine, number.spur, undecided, known.number
+        )
         for start, stop in zip(corners, corners[1:], strict=False)
     )
 

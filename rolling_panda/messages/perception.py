@@ -298,6 +298,7 @@ class Capsule(Struct, frozen=True, forbid_unknown_fields=True):
         vine: Number of the vine, as in pruning points; -1 for none.
         spur: Number of the spur that it grows from; -1 for none.
         undecided: True for canes of an undecided site, which may be cut later.
+        cane: Number of the cane on that spur, as in pruning points; -1 if unknown.
     """
 
     kind: WoodClass
@@ -308,6 +309,7 @@ class Capsule(Struct, frozen=True, forbid_unknown_fields=True):
     vine: Number = -1
     spur: Number = -1
     undecided: bool = False
+    cane: Number = -1
 
 
 #: `point_id` of a picture of the board is this with its number, from 1.

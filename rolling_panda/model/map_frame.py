@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from msgspec.structs import replace
 
 from rolling_panda.errors import ModelError
 from rolling_panda.messages.perception import Capsule, Localisation
@@ -66,12 +67,9 @@ class MapFrame:
         T = self.T_map_odom.inverse()
         ends = np.array([(each.start, each.end) for each in capsules]).reshape(-1, 3) @ T.rotation.T + T.translation
         return tuple(
-            Capsule(
-                each.kind, vector3(start), vector3(end), each.start_radius, each.end_radius, each.vine, each.spur,
-                each.undecided,
-            )
+            replace(each, start=vector3(start), end=vector3(end))
             for each, (start, end) in zip(capsules, ends.reshape(-1, 2, 3), strict=True)
-        )  # fmt: skip
+        )
 
 
 def _moved(T: Any, q: Array) -> Array:

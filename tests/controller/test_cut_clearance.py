@@ -11,6 +11,7 @@ from rolling_panda import messages as m
 from rolling_panda.messages.perception import Capsule, Obstacles
 from rolling_panda.model.robot import ARM_Q, RobotModel
 from rolling_panda.transport.inbox import Received
+from tests.support.points import point
 
 CONFIG = ControllerConfig()
 SETTINGS = CONFIG.whole_body.hierarchy
@@ -21,8 +22,8 @@ def wire(height, y=0.75):
     return Capsule("wire", (-0.2, y, height), (2.0, y, height), 0.004, 0.004)
 
 
-def find(*capsules, tangent=(0.0, 0.1, 1.0), azimuth=None, kind="spur cut"):
-    """A plan for the point, among these."""
+def find(*capsules, tangent=(0.0, 0.1, 1.0), azimuth=None, kind="spur cut", cane=0):
+    """A plan for the point, on spur 1 of vine 1, among these."""
     clearance = CutClearance(RobotModel(), CONFIG.whole_body.hierarchy)
     message = Obstacles(header=m.Header(0.0, "odom"), capsules=capsules)
     clearance.update(Received(message, 0.0))
@@ -30,7 +31,9 @@ def find(*capsules, tangent=(0.0, 0.1, 1.0), azimuth=None, kind="spur cut"):
     q[ARM_Q] = CONFIG.work.home
     checks = clearance.too_near, clearance.tool_too_near
     search = PostureSearch(RobotModel(), CONFIG.work, CONFIG.whole_body.joint_margin, *checks)
-    return completed(search.find(POINT, np.array(tangent), q, azimuth, kind))
+    along = tuple((np.array(tangent) / np.linalg.norm(tangent)).tolist())
+    cut = point("p1", tuple(POINT.tolist()), along, vine=1, spur=1, cane=cane, kind=kind)
+    return completed(search.find(cut, q, azimuth))
 
 
 def nearest(plan, capsule):
@@ -101,6 +104,38 @@ def test_a_stub_that_cannot_be_cut_without_the_cane_that_stays_is_refused():
     assert isinstance(plan, Unreachable)
     near = dict(plan.reason.values)["near"]
     assert dict(near.values)["part"] == "blades" and "cane 0" in dict(near.values)["other"]
+
+
+def beside(x, y, spur, number, undecided=False):
+    """An upright cane so far beside the point and behind it (m)."""
+    low, high = (tuple((POINT + [x, y, z]).tolist()) for z in (-0.2, 0.1))
+    return Capsule("cane", low, high, 0.004, 0.004, 1, spur, undecided, number)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_the_tool_turns_until_a_cane_that_may_stay_is_not_between_the_blades(side):
+    diagonal = beside(0.014 * side, 0.017, 2, 0, undecided=True)
+    free, turned = find(tangent=(0.0, 0.0, 1.0)), find(diagonal, tangent=(0.0, 0.0, 1.0))
+    assert isinstance(free, CutPlan) and isinstance(turned, CutPlan)
+    assert bitten(free, diagonal) and not bitten(turned, diagonal)
+    np.testing.assert_allclose(turned.poses.cut.translation, POINT)
+
+
+@pytest.mark.parametrize(("spur", "number"), [(2, 0), (1, 1)])
+@pytest.mark.parametrize("kind", ["spur cut", "cane cut", "by hand"])
+def test_a_cut_that_would_take_a_cane_that_stays_is_refused_and_names_it(spur, number, kind):
+    """It is just before the blades' tips, which pass it while they are open."""
+    plan = find(beside(0.0, 0.017, spur, number), tangent=(0.0, 0.0, 1.0), kind=kind)
+    assert isinstance(plan, Unreachable)
+    near = dict(plan.reason.values)["near"]
+    assert dict(near.values)["part"] == "blades" and f"spur {spur}" in dict(near.values)["other"]
+
+
+@pytest.mark.parametrize(("kind", "cut", "other"), [("spur cut", 0, 0), ("renewal cut", 0, 1), ("by hand", -1, 0)])
+def test_what_is_cut_and_what_falls_with_it_are_in_nothings_way(kind, cut, other):
+    """The cane of the cut itself, and of a stub the canes that go with it."""
+    plan = find(beside(0.0, 0.017, 1, other), tangent=(0.0, 0.0, 1.0), kind=kind, cane=cut)
+    assert isinstance(plan, CutPlan)
 
 
 def test_an_approach_set_by_a_person_is_kept_and_only_the_blades_lean():

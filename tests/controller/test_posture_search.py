@@ -5,6 +5,7 @@ from controller.config import ControllerConfig
 from controller.work.posture_search import CutPlan, PostureSearch, Unreachable
 from rolling_panda import reasons
 from rolling_panda.model.robot import ARM_Q, RobotModel
+from tests.support.points import point
 
 ROBOT, CONFIG = RobotModel(), ControllerConfig()
 SEARCH = PostureSearch(RobotModel(), CONFIG.work, CONFIG.whole_body.joint_margin)
@@ -15,7 +16,7 @@ def find(position, tangent=UP, lateral=0.0):
     q = np.zeros(12)
     q[1] = lateral
     q[ARM_Q] = CONFIG.work.home
-    search, steps = SEARCH.find(np.array(position), tangent, q), 0
+    search, steps = SEARCH.find(point("p1", position, tuple(tangent)), q), 0
     while True:
         try:
             next(search)

@@ -14,13 +14,14 @@ from controller.work.cutting import ApproachSegments
 from controller.work.posture_search import PostureSearch, completed
 from rolling_panda.model.robot import ARM_Q, RobotModel
 from tests.support.controller_config import controller_config
+from tests.support.points import point
 
 ROBOT, CONFIG, UP = RobotModel(), ControllerConfig(), np.array([0.0, 0.0, 1.0])
 START = np.zeros(12)
 START[ARM_Q] = CONFIG.work.home
 TOOL = ROBOT.pose(START, ROBOT.tool_id).copy()
 SEARCH = PostureSearch(RobotModel(), CONFIG.work, CONFIG.whole_body.joint_margin)
-CUTS = [completed(SEARCH.find(np.array([x, 0.75, 1.05]), UP, START)) for x in (0.4, 1.4, 2.4)]
+CUTS = [completed(SEARCH.find(point("p1", (x, 0.75, 1.05)), START)) for x in (0.4, 1.4, 2.4)]
 
 
 def test_a_motion_takes_as_long_as_the_slowest_of_base_arm_and_tool() -> None:

@@ -115,6 +115,15 @@ def test_a_renewal_cut_beside_a_cane_shortens_nothing():
     )
 
 
+def test_a_renewal_cut_tells_which_cane_stays_though_its_own_cut_is_unknown():
+    renewal = cut(0.01, kind="renewal cut")
+    renewal = replace(renewal, cut=replace(renewal.cut, cane=1))
+    capsules = told(known(cane(), cane(0.05)), renewal)
+    assert {round(c.end[0], 2) for c in capsules} == {0.05} and not any(c.undecided for c in capsules)
+    assert {c.cane for c in capsules} == {1}
+    assert top(capsules) == pytest.approx(0.19, abs=0.002), "as far as the rule would leave it"
+
+
 def test_cuts_on_other_spurs_say_nothing():
     assert told(known(cane()), cut(0.05, number=SpurNumber(2, 4))) == told(known(cane()))
 
