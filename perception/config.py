@@ -34,7 +34,9 @@ class RuleConfig(Struct, frozen=True, forbid_unknown_fields=True):
         shears_clearance: Distance of the keeper from a renewal cut in the plane of the blades, on either side and in
             depth (m), within `blade_half` of that plane.
         blade_half: Half the thickness of the blades, with the radius of a cane and the error of its place (m).
-        blade_lean: Largest lean of the blades in a renewal cut (rad), that of the controller.
+        blade_turn: Largest turn of the blades about the wood in a renewal cut (rad), that of the controller.
+        blade_tilt: Their largest tilt out of the plane square to the wood (rad), that of the controller.
+        blade_lean: Their largest lean about the approach (rad), that of the controller.
         crossing_distance: Distance of other canes from a cut: half the opening of the blades (m).
         max_base_gap: Longest hidden stretch at the base of a cane whose nodes can be counted (m).
         max_diameter: Thickest cane that the shears may cut (m).
@@ -67,6 +69,8 @@ class RuleConfig(Struct, frozen=True, forbid_unknown_fields=True):
     min_stub: Positive = 0.016
     shears_clearance: Positive = 0.022
     blade_half: Positive = 0.006
+    blade_turn: Positive = 0.7
+    blade_tilt: Positive = 0.26
     blade_lean: Positive = 0.44
     max_base_gap: Positive = 0.018
     crossing_distance: Positive = 0.015

@@ -10,6 +10,8 @@ Nothing is extrapolated: nodes that were not seen are not counted.
 
 import math
 from dataclasses import dataclass
+from functools import cache
+from itertools import product
 from typing import Final, Literal
 
 import numpy as np
@@ -30,8 +32,8 @@ CUTTING_STRENGTH = 9.34e6
 _VISIBLE_HALF_WIDTH = 0.008
 #: Confidence of a renewal cut beside a cane whose own cut is undecided: never one that is accepted unseen.
 _DOUBTFUL = 0.5
-#: Leans of the blades in a renewal cut, as shares of the largest.
-_LEANS = (0.0, 1 / 3, -1 / 3, 2 / 3, -2 / 3, 1.0, -1.0)
+#: Turns, tilts and leans of the blades in a renewal cut, as shares of the largest.
+_SHARES = (0.0, 0.5, -0.5, 1.0, -1.0)
 #: Places of a renewal cut between the cane that stays and the next one, by shares of the way, in order of preference.
 _STUB_SHARES = (0.5, 0.65, 0.8)
 #: Length of a cane that gives its direction at the base (m), least sine of its angle to the stub, and most that the
@@ -352,11 +354,13 @@ def _renew(spur: Spur, keeper: _Keeper, shorten: Cut | Reason, config: RuleConfi
     shortest = min(room, min(nearest_seen, length) - keeper_seen)
     if shortest < config.min_stub:
         return left(reasons.stub_too_short(1000 * max(shortest, 0.0)))
-    places = (root + (keeper_at + share * room) * along for share in _STUB_SHARES)
+    places = [root + (keeper_at + share * room) * along for share in _STUB_SHARES]
     hidden = np.linspace(root + keeper_at * along, keeper.cane.base, 5)
     axis = np.concatenate([hidden, keeper.cane.axis])
-    passed = (place for place in places if _blades_pass(axis, place, along, config))
-    position = next(passed, None)
+    lean = config.blade_lean
+    # A lean alone is within reach most often.
+    tries = product(((0.0, 0.0, lean), (config.blade_turn, config.blade_tilt, lean)), places)
+    position = next((place for angles, place in tries if _blades_pass(axis, place, along, angles, config)), None)
     if position is None:
         return left(reasons.shears_touch_keeper())
     if (reason := keep_out.reason(position)) is not None:
@@ -400,24 +404,38 @@ def _origin(cane: Cane, root: Array, along: Array) -> tuple[float, float]:
     return seen - min(back * forward, _THICK), seen
 
 
-def _blades_pass(keeper: Array, position: Array, along: Array, config: RuleConfig) -> bool:
-    """Whether the blades, leaned as far as they may, pass the cane that stays beside a cut through its stub.
+def _blades_pass(
+    keeper: Array, position: Array, along: Array, angles: tuple[float, float, float], config: RuleConfig
+) -> bool:
+    """Whether the blades, turned, tilted and leaned within limits, pass the cane that stays beside a cut of its stub.
 
     Args:
         keeper: Axis of the cane that stays, from that of the stub (N×3, m, odom).
         position: Of the cut (3, m, odom).
         along: Unit vector along the stub (3, odom).
-        config: Clearances and largest lean.
+        angles: Largest turn, tilt and lean (rad).
+        config: Clearances.
     """
     depth = APPROACH - float(APPROACH @ along) * along
     depth = depth / max(float(np.linalg.norm(depth)), 1e-9)
-    side = np.cross(along, depth)
-    off = keeper - position
-    deep = np.abs(off @ depth) < config.shears_clearance
-    for share in _LEANS:
-        lean = share * config.blade_lean
-        height = off @ (np.cos(lean) * along + np.sin(lean) * side)
-        beside = off @ (np.cos(lean) * side - np.sin(lean) * along)
-        if not np.any(deep & (np.abs(height) < config.blade_half) & (np.abs(beside) < config.shears_clearance)):
-            return True
-    return False
+    square = np.stack([np.cross(along, depth), along, depth])
+    off = (keeper - position) @ square.T
+    off = off[np.linalg.norm(off, axis=1) < 2.0 * config.shears_clearance]
+    room = np.array([config.shears_clearance, config.blade_half, config.shears_clearance])
+    between = np.all(np.abs(np.einsum("nij,pj->npi", _blade_axes(*angles), off)) < room, axis=2)
+    return not between.any(axis=1).all()
+
+
+@cache
+def _blade_axes(turn: float, tilt: float, lean: float) -> Array:
+    """Axes of the blades (N×3×3: beside, normal, depth) in those of blades square to the wood, by largest angles."""
+    out = []
+    angles = ([share * largest for share in _SHARES] if largest else [0.0] for largest in (turn, tilt, lean))
+    for about_wood, about_side, about_depth in product(*angles):
+        c, s = math.cos(about_wood), math.sin(about_wood)
+        axes = np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]])
+        c, s = math.cos(about_side), math.sin(about_side)
+        axes = np.array([[1.0, 0.0, 0.0], [0.0, c, s], [0.0, -s, c]]) @ axes
+        c, s = math.cos(about_depth), math.sin(about_depth)
+        out.append(np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ axes)
+    return np.array(out)

@@ -40,6 +40,8 @@ _GONE_SHARE, _MIN_VISIBLE, _GONE_FRAMES = 0.7, 3, 3
 _MAX_RANGE = 1.6
 #: Longest internode (m), for a cane whose nodes were not all seen.
 _MAX_INTERNODE = 0.10
+#: Canes of two spurs whose bases are farther apart than this are two (m).
+_SAME_BASE = 0.03
 #: Shorter remains are ignored (m).
 _MIN_LENGTH = 0.02
 
@@ -108,12 +110,24 @@ class RetainedCanes:
             if cane.range(view.t) < _MAX_RANGE:
                 _check_presence(cane, view, labels)
         nearest: list[_Cane] = []
-        for cane in sorted(self._canes.values(), key=lambda cane: cane.range(view.t)):
+        for cane in sorted(self._distinct(), key=lambda cane: cane.range(view.t)):
             if sum(len(other.capsules) for other in nearest) + len(cane.capsules) > max_capsules:
                 break
             nearest.append(cane)
         # In constant order, so that messages without news are equal.
         return tuple(c for cane in self._canes.values() if cane in nearest for c in cane.capsules)
+
+    def _distinct(self) -> list[_Cane]:
+        """The published canes; of those that run along each other on two spurs, the one that was seen more often."""
+        known = [(number, cane, cane.axis) for (number, _), cane in self._canes.items() if cane.axis is not None]
+        bases = np.array([axis[0] for _, _, axis in known]).reshape(-1, 3)
+        twice: set[int] = set()
+        for i, j in np.argwhere(np.triu(cdist(bases, bases) < _SAME_BASE, 1)).tolist():
+            (spur, cane, axis), (other_spur, other, other_axis) = known[i], known[j]
+            short, long = sorted((axis, other_axis), key=len)
+            if spur != other_spur and cdist(short, long).min(axis=1).max() < _POSITION_TOLERANCE:
+                twice.add(j if cane.observations >= other.observations else i)
+        return [cane for k, (_, cane, _) in enumerate(known) if k not in twice]
 
     def select(self, spurs: Iterable[KnownSpur], cuts: Sequence[Proposal], rule: RuleConfig) -> None:
         """Select the retained canes of some spurs again; arguments as of `update`."""

@@ -116,10 +116,10 @@ def test_the_old_stub_goes_whether_or_not_the_cut_of_the_keeper_is_known():
     assert apply_rule(spur(hidden, high), RULE) == Decision(undecided=(reasons.cane_base_hidden(),))
 
 
-def leaving(base, angle, towards=1.0):
-    """A cane that leaves its stub at an angle (rad) along the row."""
+def leaving(base, angle, towards=1.0, deep=0.0):
+    """A cane that leaves its stub at an angle (rad) along the row, or `deep` across it."""
     arc = np.linspace(0.0, 0.5, 101)
-    direction = np.array([towards * np.sin(angle), 0.0, np.cos(angle)])
+    direction = np.array([towards * np.sin(angle), deep * np.sin(angle), np.cos(angle)])
     nodes = tuple(Node(node, 30) for node in (0.02, 0.10, 0.18, 0.26))
     return Cane(np.array(base) + arc[:, None] * direction, arc, 0.004, nodes, (), "image border", 0.0)
 
@@ -129,11 +129,19 @@ def test_a_stub_goes_where_leaning_blades_pass_the_cane_that_stays(towards):
     above = cane(base=(0.0, 0.0, 0.972))
     wide, steep = (spur(leaving((0.0, 0.0, 0.941), angle, towards), above) for angle in (0.8, 0.3))
     assert [cut.kind for cut in apply_rule(wide, RULE).cuts] == ["spur cut", "renewal cut"]
-    upright = RuleConfig(blade_lean=1e-6)
+    upright = RuleConfig(blade_lean=1e-6, blade_tilt=1e-6)
     for seen, rule in ((steep, RULE), (wide, upright)):
         decision = apply_rule(seen, rule)
         assert [cut.kind for cut in decision.cuts] == ["spur cut"]
         assert decision.undecided == (reasons.other_cane_left(reasons.shears_touch_keeper()),)
+
+
+@pytest.mark.parametrize("deep", [1.0, -1.0])
+def test_a_stub_goes_where_tilted_blades_pass_a_cane_that_leaves_across_the_row(deep):
+    seen = spur(leaving((0.0, 0.0, 0.941), 0.8, 0.0, deep), cane(base=(0.0, 0.0, 0.972)))
+    assert [cut.kind for cut in apply_rule(seen, RULE).cuts] == ["spur cut", "renewal cut"]
+    level = apply_rule(seen, RuleConfig(blade_turn=1e-6, blade_tilt=1e-6))
+    assert level.undecided == (reasons.other_cane_left(reasons.shears_touch_keeper()),)
 
 
 def test_a_cut_where_another_cane_crosses_is_left_alone():

@@ -128,6 +128,15 @@ def test_cuts_on_other_spurs_say_nothing():
     assert told(known(cane()), cut(0.05, number=SpurNumber(2, 4))) == told(known(cane()))
 
 
+@pytest.mark.parametrize("aside", [0.003, 0.02])
+def test_a_cane_that_two_spurs_show_in_the_same_place_is_one(aside):
+    plants = known(cane(), looks=6)
+    again = Plant((Spur(BASE, None, 0.007, (cane(aside),)),), np.zeros((0, 3)), ())
+    for _ in range(3):
+        plants.update(again, (SpurNumber(2, 9),))
+    assert {c.spur for c in told(plants, cut(0.2))} == ({3} if aside < 0.008 else {3, 9})
+
+
 def test_a_cane_is_believed_after_enough_looks():
     assert told(known(cane(), looks=CONFIG.min_hits - 1)) == ()
     assert told(known(cane(), looks=CONFIG.min_hits)) != ()
