@@ -41,6 +41,7 @@ from rolling_panda import messages as m
 from rolling_panda.commands import SURE
 from rolling_panda.config import load_section
 from rolling_panda.errors import InputError
+from rolling_panda.messages.supervision import SessionPlan
 from tests.support.worlds.closed_loop import ClosedLoop
 
 Training = Literal["spur", "guyot"]
@@ -62,8 +63,8 @@ _CHANGED_S, _LONGEST_LOOK_S = 0.7, 15.0
 GLANCE_S = 0.33
 #: Fewer cuts and places than this are decided one by one: that takes no more presses.
 _AT_ONCE = 4
-#: After the last decision the plan settles and is computed (s).
-_PLAN_S = 2.0
+#: After the last decision the plan settles and is computed; Start is pressed without one after so long (s).
+_PLAN_S = 5.0
 #: A point is accepted no more often than this; stretches of decisions and work, since work finds more points.
 _ACCEPTED_AT_MOST, _ROUNDS = 2, 3
 #: Whoever decides more often than this goes in circles.
@@ -326,6 +327,12 @@ class Reviewer:
         return point
 
 
+def _planned(loop: ClosedLoop) -> bool:
+    """Whether the plan of the accepted cuts is valid."""
+    told = loop.inbox.newest(SessionPlan)
+    return told is not None and told.message.state == "valid"
+
+
 def _stands(row: Row, point: m.PruningPoint) -> bool:
     """Whether the wood past a cut still stands."""
     beyond = np.array(point.position) + _BEYOND * np.array(point.tangent)
@@ -374,7 +381,7 @@ class Visit:
             self._spent("decisions")
             if self.reviewer.decisions == decided or not any(loop.queue("ACCEPTED", "UNREACHABLE")):
                 break
-            loop.run(_PLAN_S)
+            loop.run_until(lambda: _planned(loop), _PLAN_S)
             self._spent("plan")
             self._work()
             if loop.controller.mode != "READY":
