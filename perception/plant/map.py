@@ -176,6 +176,15 @@ class KnownSpur:
         canes = [cane.as_cane() for cane in self.canes if 2 * cane.base.count >= self.position.count]
         return replace(self.best, canes=tuple(sorted(canes, key=lambda cane: -cane.length)))
 
+    def hidden_canes(self, seen: tuple[Cane, ...]) -> tuple[Cane, ...]:
+        """The standing canes that at least half of the observations have shown, but this one does not."""
+        numbers = {cane.number for cane in seen}
+        return tuple(
+            cane.with_median_radius(cane.best)
+            for cane in self.canes
+            if cane.number not in numbers and 2 * cane.base.count >= self.position.count and np.isinf(cane.cut_at)
+        )
+
     def nearest_cane(self, position: Array) -> tuple[int, float, float]:
         """Index, distance (m) and arc length (m) of the cane nearest to a position; distance infinite without canes."""
         best = 0, np.inf, 0.0
@@ -209,6 +218,8 @@ class PlantMap:
     def update(self, plant: Plant, numbers: tuple[SpurNumber, ...]) -> tuple[Spur, ...]:
         """Add the plant of one frame; returns its spurs with the median stub, and with the median radius of each cane.
 
+        They have the hidden canes that at least half of the observations have shown.
+
         Args:
             plant: Plant of one frame.
             numbers: Of its spurs, in their order.
@@ -222,8 +233,8 @@ class PlantMap:
                 known.position.add(spur.position)
                 if not spur.incomplete and (known.best.incomplete or len(spur.canes) > len(known.best.canes)):
                     known.best = spur
-            canes = tuple(_associate(known, cane).with_median_radius(cane) for cane in spur.canes)
-            out.append(replace(known.with_median_stub(spur), canes=canes))
+            seen = tuple(_associate(known, cane).with_median_radius(cane) for cane in spur.canes)
+            out.append(replace(known.with_median_stub(spur), canes=seen, hidden=known.hidden_canes(seen)))
         return tuple(out)
 
     def sever(self, position: Array) -> bool:

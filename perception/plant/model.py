@@ -102,6 +102,7 @@ class Spur:
         radius: Of the stub (m), 0 where it is not clearly visible.
         canes: Longest first.
         incomplete: Reason why canes may be out of view; None if none.
+        hidden: Canes that other frames have shown, but this one does not.
     """
 
     position: Array
@@ -109,6 +110,7 @@ class Spur:
     radius: float
     canes: tuple[Cane, ...]
     incomplete: Reason | None = None
+    hidden: tuple[Cane, ...] = ()
 
 
 @dataclass(frozen=True)

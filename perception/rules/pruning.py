@@ -121,6 +121,8 @@ def _prune_spur(spur: Spur, config: RuleConfig, others: list[Array], keep_out: K
     keeper = choose_keeper(spur, config)
     if isinstance(keeper, Reason):
         return Decision(undecided=(keeper,))
+    if any(keeper.cane is cane for cane in spur.hidden):
+        return Decision(undecided=(reasons.cane_base_hidden(),))
     wood = [cane.axis for cane in spur.canes if cane is not keeper.cane] + others
     shorten = _shorten(keeper, wood, config, keep_out)
     if len(spur.canes) == 1:
@@ -158,7 +160,7 @@ def choose_keeper(spur: Spur, config: RuleConfig) -> _Keeper | Reason:
         spur: At least one cane.
         config: Smallest diameter and measurement errors.
     """
-    canes = sorted(spur.canes, key=lambda cane: (float(cane.base[2]), -cane.radius))
+    canes = sorted((*spur.canes, *spur.hidden), key=lambda cane: (float(cane.base[2]), -cane.radius))
     if len(canes) == 1:
         return _Keeper(canes[0], "only", 1)
     margin = config.diameter_error / np.sqrt(min(config.max_averaged, *(cane.observations for cane in canes)))

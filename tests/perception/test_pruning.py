@@ -86,6 +86,13 @@ def test_the_keeper_is_the_lowest_thick_cane_else_the_thickest():
     assert choose_keeper(spur(thin, thinner), RULE).cane is thin
 
 
+def test_a_cane_that_this_picture_hides_counts_in_the_choice():
+    low, high = cane(base=(0.02, 0.0, 0.93)), cane(base=(0.0, 0.0, 0.99))
+    assert apply_rule(replace(spur(high), hidden=(low,)), RULE) == Decision(undecided=(reasons.cane_base_hidden(),))
+    (only,) = apply_rule(replace(spur(low), hidden=(high,)), RULE).cuts
+    assert only.kind == "spur cut" and only.reason.code == "spur_cut_lowest"
+
+
 def test_a_choice_within_the_noise_is_no_choice():
     doubtful = cane(radius=0.00305, base=(0.02, 0.0, 0.93))
     assert choose_keeper(spur(doubtful, cane(base=(0.0, 0.0, 0.99))), RULE) == reasons.low_cane_near_limit()
