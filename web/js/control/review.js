@@ -201,13 +201,14 @@ export function ofVine(vine) {
  */
 export function acceptAll(rows) {
   const stands = (/** @type {PagePoint} */ row) => isAccepted(itemOf(keyOfPoint(row))?.row ?? undefined);
-  return decideAll(rows, "undo.accepted", keyOfPoint, sendAcceptance, stands, reconsider);
+  return decideAll(rows, (count) => counted("undo.accepted", count), keyOfPoint, sendAcceptance, stands, reconsider);
 }
 
 /** Leave places as they are; one undo takes all back. @param {readonly Item[]} places */
 export function leaveAll(places) {
   const stands = (/** @type {Item} */ { key }) => itemOf(key)?.status === "left";
-  return decideAll(places, "undo.left", ({ key }) => key, (item) => sendLeft(item, true), stands, (item) => sendLeft(item, false));
+  const send = (/** @type {boolean} */ left) => (/** @type {Item} */ item) => sendLeft(item, left);
+  return decideAll(places, (count) => counted("undo.left", count), ({ key }) => key, send(true), stands, send(false));
 }
 
 /**
@@ -215,7 +216,7 @@ export function leaveAll(places) {
  *
  * @template T
  * @param {readonly T[]} all
- * @param {string} words
+ * @param {(count: number) => string} words
  * @param {(each: T) => string} keyOf
  * @param {(each: T) => Promise<boolean>} decide
  * @param {(each: T) => boolean} stands
@@ -233,7 +234,7 @@ async function decideAll(all, words, keyOf, decide, stands, back) {
     return taken.length > 0 && taken.every(Boolean);
   };
   const sent = Promise.all(all.map(send)).then(() => done.length > 0);
-  await undoable(sent, () => counted(words, done.length || all.length), takeBack);
+  await undoable(sent, () => words(done.length || all.length), takeBack);
 }
 
 // A point that is chosen anywhere is looked at. The work does not take a picture away under a press.
