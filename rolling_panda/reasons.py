@@ -2724,6 +2724,16 @@ def cane_in_way(part: str, other: str, force_n: float) -> None:
     """A cane in the way, about {force_n:.0f} N: {part}, and probably {other}."""
 
 
+@_reason("warning", "")
+def cane_met(part: str, other: str, force_n: float) -> None:
+    """A cane pushed with about {force_n:.0f} N: {part}, and probably {other}. The cut is tried again another way."""
+
+
+@_reason("warning", "")
+def given_up_after(tries: float, why: Reason) -> None:
+    """After {tries:.0f} {tries:try|tries}: {why}."""
+
+
 @_reason("info", "")
 def cane_on_way_out(part: str, other: str, force_n: float) -> None:
     """A cane pushes on the way out, about {force_n:.0f} N: {part}, and probably {other}. The robot goes on."""

@@ -18,7 +18,7 @@ import pinocchio as pin
 from controller.config import ContactConfig
 from controller.whole_body.collision_geometry import part_of, robot_geometry
 from controller.whole_body.compiled import MATRIX, NOTHING, NUMBER, VECTOR, compiled
-from controller.whole_body.obstacle import Obstacle
+from controller.whole_body.obstacle import Obstacle, Point
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.model.differential_drive import Array
@@ -60,12 +60,14 @@ class Touch:
         obstacle: Name of the known obstacle there; empty for something unknown.
         force: On the robot (3, N, odom).
         point: Where (3, m, odom).
+        axis: Both ends of the obstacle's axis (m, odom); None for something unknown.
     """
 
     part: str
     obstacle: str
     force: Array
     point: Array
+    axis: tuple[Point, Point] | None = None
 
     @property
     def reason(self) -> m.Reason:
@@ -299,17 +301,20 @@ class Spots:
         forces = np.linalg.solve(normal, A.transpose(0, 2, 1) @ wanted[:, None])[:, :, 0]
         misfits = np.linalg.norm((A @ forces[:, :, None])[:, :, 0] - wanted, axis=1) / float(np.linalg.norm(wanted))
         likely = np.flatnonzero(misfits <= misfits.min() + _UNSURE)
-        spot, name = self._beside(spots, forces, likely, obstacles)
-        if not name:
+        spot, beside = self._beside(spots, forces, likely, obstacles)
+        if beside is None:
             spot = int(misfits.argmin())
         force = forces[spot]
         inwards = force / max(float(np.linalg.norm(force)), 1e-9)
-        return Touch(self.parts[spot], name, force, spots[spot] - self.radii[spot] * inwards)
+        name, axis = ("", None) if beside is None else (beside.name, (beside.start, beside.end))
+        return Touch(self.parts[spot], name, force, spots[spot] - self.radii[spot] * inwards, axis)
 
-    def _beside(self, spots: Array, forces: Array, likely: Any, obstacles: Sequence[Obstacle]) -> tuple[int, str]:
-        """The likely spot nearest to an obstacle that its force comes from, and its name; empty for none."""
+    def _beside(
+        self, spots: Array, forces: Array, likely: Any, obstacles: Sequence[Obstacle]
+    ) -> tuple[int, Obstacle | None]:
+        """The likely spot nearest to an obstacle that its force comes from, and that obstacle; None without one."""
         if not obstacles:
-            return 0, ""
+            return 0, None
         start = np.array([o.start for o in obstacles])
         along = np.array([o.end for o in obstacles]) - start
         around = np.array([o.radius for o in obstacles])
@@ -322,4 +327,4 @@ class Spots:
         towards = (offset * forces[likely, None]).sum(axis=2) / np.maximum(distance, 1e-9) / size[:, None]
         gaps[towards < _TOWARDS] = np.inf
         row, column = np.unravel_index(int(gaps.argmin()), gaps.shape)
-        return (int(likely[row]), obstacles[int(column)].name) if gaps[row, column] < _BESIDE else (0, "")
+        return (int(likely[row]), obstacles[int(column)]) if gaps[row, column] < _BESIDE else (0, None)

@@ -46,6 +46,7 @@ class CutPlanner:
             config.whole_body.joint_margin,
             self._clearance.too_near,
             self._clearance.tool_too_near,
+            self._clearance.tool_room,
         )
         self._rollout = Rollout(config, robot_config)
 
@@ -81,12 +82,12 @@ class CutPlanner:
     def _postures(self, request: PlanRequest) -> tuple[dict[str, CutPlan], dict[str, Reason]]:
         """A posture for each cut, and the reason where there is none."""
         self._clearance.update(Received(Obstacles(header=Header(), capsules=request.obstacles), 0.0))
-        turned = dict(request.turned)
+        turned, tries = dict(request.turned), dict(request.tries)
         cuts: dict[str, CutPlan] = {}
         refused: dict[str, Reason] = {}
         for point in request.points:
             name = point.point_id
-            found = completed(self._search.find(point, request.q, turned.get(name)))
+            found = completed(self._search.find(point, request.q, turned.get(name), tries.get(name, ())))
             if isinstance(found, CutPlan):
                 cuts[name] = found
             else:
@@ -94,13 +95,18 @@ class CutPlanner:
         return cuts, refused
 
     def _order(self, request: PlanRequest, cuts: dict[str, CutPlan]) -> list[str]:
-        """The order of work: as people want it, points that they do not name last, else the fastest one found."""
+        """The order of work: as people want it, points that they do not name last, else the fastest one found.
+
+        What was tried in vain comes after the others, unless people want it elsewhere.
+        """
         names = list(cuts)
         if request.order:
             places = {name: place for place, name in enumerate(request.order)}
             return sorted(names, key=lambda name: places.get(name, len(places)))
         start = self._robot.pose(request.q, self._robot.tool_id).copy(), request.q
-        return [names[i] for i in shortest(travel_times(self._config, self._flows, start, list(cuts.values())))]
+        fastest = [names[i] for i in shortest(travel_times(self._config, self._flows, start, list(cuts.values())))]
+        tried = dict(request.tries)
+        return sorted(fastest, key=lambda name: name in tried)
 
     def _roll(self, request: PlanRequest, cuts: dict[str, CutPlan], order: Sequence[str]) -> Preview:
         """Rollout of the first cuts of an order."""
@@ -114,6 +120,7 @@ class CutPlanner:
                 cuts,
                 request.close_up_s,
                 request.turned,
+                request.tries,
             )
         )
 
@@ -127,6 +134,7 @@ class CutPlanner:
             request.obstacles,
             request.order,
             request.turned,
+            request.tries,
             request.close_up_s,
             refused,
             rolled,

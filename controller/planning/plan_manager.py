@@ -1,6 +1,6 @@
 """The plan in force: its request, its state, and when points, obstacles or the robot's place void it."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from controller.planning.work_plan import PlannedCut, PlanRequest, WorkPlan, ses
 from controller.whole_body.obstacle import Axes, Obstacle
 from controller.work.point_queue import BOUND, PointQueue, Ticket
 from controller.work.posture_search import CutPlan
+from controller.work.tries import Made
 from rolling_panda import reasons
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.messages.supervision import PlanState, SessionPlan
@@ -89,12 +90,13 @@ class PlanManager:
             self._queue.reach(self._plan.request.points, self._plan.refused, busy)
         pause = _AGAIN_S if self._plan is not None and self._plan.failure else _PAUSE_S
         due = self._asked is None and now - self._quiet_since >= _SETTLED_S and now - self._asked_at >= pause
-        wanted = not self.valid or (working and self._runs_out())
+        wanted = not self.valid or self._tried_since() or (working and self._runs_out())
         if not wanted or not due or not accepted or q is None or not (at_rest or working):
             return None
         self._number += 1
         self._asked_at = now
-        self._asked = PlanRequest(self._number, q.copy(), accepted, tuple(obstacles), order, turned, close_up_s)
+        tries = self._queue.tries.made
+        self._asked = PlanRequest(self._number, q.copy(), accepted, tuple(obstacles), order, turned, tries, close_up_s)
         self._check(why, True)
         return self._asked
 
@@ -108,7 +110,7 @@ class PlanManager:
         """Planned cuts by point id; None while a plan is computed."""
         if self._state == "planning" or (self._state in ("none", "void") and self._queue.next() is not None):
             return None
-        return {name: cut.cut for name, cut in self._cuts.items()} if self.valid else {}
+        return {name: cut.cut for name, cut in self._cuts.items() if not self._tried_since(name)} if self.valid else {}
 
     def known(self, ticket: Ticket) -> CutPlan | None:
         """The planned cut of an accepted point; None without a valid one."""
@@ -118,7 +120,7 @@ class PlanManager:
         if plan.request.turned != self._queue.approaches.turned:
             return None
         cut = self._cuts.get(point_id)
-        return cut.cut if cut is not None and self.valid else None
+        return cut.cut if cut is not None and self.valid and not self._tried_since(point_id) else None
 
     def message(self, now: float) -> SessionPlan | None:
         """The message of the plan after a change."""
@@ -133,6 +135,12 @@ class PlanManager:
         self._watch, self._compared = ObstacleWatch.of(made), None
         self._fresh = True
         self._arrange()
+
+    def _tried_since(self, *names: str) -> bool:
+        """Whether one of these cuts, or any, was tried in vain since the plan, which holds for the others."""
+        made = self._queue.tries.made
+        before = made if self._plan is None else self._plan.request.tries
+        return tried_since(before, made, names or dict(made)) is not None
 
     def _runs_out(self) -> bool:
         """Whether one of the next cuts of the work is not rolled out yet."""
@@ -223,6 +231,11 @@ def approaches_changed(before: tuple[tuple[str, float], ...], now: tuple[tuple[s
     for point_id, _ in sorted(set(before) ^ set(now)):
         return reasons.approach_turned_after(point_id)
     return None
+
+
+def tried_since(before: Made, now: Made, names: Collection[str]) -> Reason | None:
+    """Which of these points has been tried in vain since; None if none."""
+    return next((reasons.approach_turned_after(name) for name, _ in set(now) - set(before) if name in names), None)
 
 
 def place_changed(plan: WorkPlan, q: Array) -> Reason | None:

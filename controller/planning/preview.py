@@ -11,7 +11,7 @@ import numpy as np
 from controller.config import HierarchyConfig
 from controller.ledger.journal import Journal, PreviewRequiredRow
 from controller.planning.path_watch import PathWatch
-from controller.planning.plan_manager import approaches_changed, away_from
+from controller.planning.plan_manager import approaches_changed, away_from, tried_since
 from controller.planning.preview_plan import Preview, PreviewRequest, motion_message, state_message
 from controller.work.point_queue import PointQueue, Ticket
 from controller.work.posture_search import CutPlan
@@ -127,10 +127,12 @@ class PreviewManager:
 
     def known(self, ticket: Ticket) -> CutPlan | None:
         """The posture that the preview has shown for a cut, where work follows an approved one; else None."""
-        preview = self._preview
+        preview, point_id = self._preview, ticket.point.point_id
         if preview is None or not self._begun or ticket.accepted not in preview.request.points:
             return None
-        return preview.plans.get(ticket.point.point_id)
+        if tried_since(preview.request.tries, self._queue.tries.made, (point_id,)):
+            return None
+        return preview.plans.get(point_id)
 
     def review(
         self,
@@ -184,9 +186,9 @@ class PreviewManager:
         following, names = self._queue.next(), tuple(point.point_id for point in points)
         # While it is valid, only people change its order.
         self._order = names if following is not None and following.point.point_id == names[0] else ()
-        turned = self._queue.approaches.turned
+        turned, tries = self._queue.approaches.turned, self._queue.tries.made
         self._asked = PreviewRequest(
-            self._number, q.copy(), points, tuple(obstacles), dict(cuts or {}), close_up_s, turned
+            self._number, q.copy(), points, tuple(obstacles), dict(cuts or {}), close_up_s, turned, tries
         )
         self._set_phase("rolling")
         return self._asked
@@ -255,6 +257,9 @@ class PreviewManager:
         if why := self._points_changed(preview, working):
             return why
         if why := approaches_changed(preview.request.turned, self._queue.approaches.turned):
+            return why
+        names = {point.point_id for point in preview.request.points}
+        if why := tried_since(preview.request.tries, self._queue.tries.made, names):
             return why
         if self._compared is not obstacles:
             self._compared = obstacles

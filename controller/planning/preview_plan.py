@@ -8,6 +8,7 @@ import numpy as np
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.collision_geometry import Shapes
 from controller.work.posture_search import CutPlan
+from controller.work.tries import Made
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import Capsule, PruningPoint
 from rolling_panda.messages.supervision import PreviewedCut, PreviewMotion, PreviewPhase, PreviewRow, PreviewState
@@ -44,6 +45,7 @@ class PreviewRequest:
         obstacles: Obstacles.
         cuts: Cuts of the current plan by point id. For other points the posture is searched as in work.
         turned: Turn of the approach about the cane (rad) for points where a person has set it.
+        tries: Tries in vain by point, with what was in the way.
         close_up_s: Time from the request of a close-up to its result (s).
     """
 
@@ -54,6 +56,7 @@ class PreviewRequest:
     cuts: dict[str, CutPlan] = field(default_factory=dict)
     close_up_s: float = 0.5
     turned: tuple[tuple[str, float], ...] = ()
+    tries: Made = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -75,7 +75,9 @@ class _Run:
             self._queue.accept(point.point_id, point.revision, "preview")
         for point_id, azimuth in request.turned:
             self._queue.approaches.turn(point_id, azimuth, "preview")
-        self._queue.arrange(tuple(point.point_id for point in request.points))
+        for point_id, tries in request.tries:
+            self._queue.tries.put(point_id, tries)
+        self._queue.hold(tuple(point.point_id for point in request.points))
         self._movement = Movement(config, robot_config, self._queue, EventLogger(self._journal), "preview", self._known)
         robot = self._movement.body.robot
         self._actuators = ActuatorLag(
@@ -209,7 +211,8 @@ class _Run:
     def _digest(self) -> str:
         encode = msgspec.msgpack.Encoder(order="deterministic").encode
         request, out = self._request, self._hash
-        for part in (*self._configs, request.points, request.obstacles, request.turned, request.close_up_s):
+        wanted = request.turned, request.tries
+        for part in (*self._configs, request.points, request.obstacles, *wanted, request.close_up_s):
             out.update(encode(part))
         out.update(np.ascontiguousarray(request.q, dtype="<f8").tobytes())
         return out.hexdigest()

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from controller.work.posture_search import CutPlan
+from controller.work.tries import Made
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import Capsule, PruningPoint
 from rolling_panda.messages.supervision import PlanState, PointPlan, PreviewedCut, SessionPlan
@@ -24,6 +25,7 @@ class PlanRequest:
         obstacles: Obstacles.
         turned: Turn of the approach about the cane (rad) for points where a person has set it.
         order: Points in the order set by people; empty if the plan chooses the order.
+        tries: Tries in vain by point, with what was in the way.
         close_up_s: Time from the request of a close-up to its result (s).
     """
 
@@ -33,6 +35,7 @@ class PlanRequest:
     obstacles: tuple[Capsule, ...] = ()
     order: tuple[str, ...] = ()
     turned: tuple[tuple[str, float], ...] = ()
+    tries: Made = ()
     close_up_s: float = 0.5
 
 

@@ -200,13 +200,17 @@ class CollisionModel:
         Returns:
             Distances (k, m) and names of both sides (k).
         """
-        ends = self._tool_ends @ T_odom_tool.rotation.T + T_odom_tool.translation
-        gaps = self._axes.capsule_gaps(ends[0], ends[1], self._tool_radii)
+        gaps = self.tool_gaps(T_odom_tool, self._axes)
         if self._ignores:
             gaps[self._ignored[self._tool_rows]] = np.inf
         near = np.argwhere(gaps < within)
         pairs = [(self._parts[self._tool_rows[part]], self._obstacles[at].name) for part, at in near.tolist()]
         return gaps[near[:, 0], near[:, 1]], tuple(pairs)
+
+    def tool_gaps(self, T_odom_tool: Any, axes: Axes) -> Array:
+        """Distances (t×n, m) of the tool's parts, at a pose (pin.SE3), from the axes of n obstacles."""
+        ends = self._tool_ends @ T_odom_tool.rotation.T + T_odom_tool.translation
+        return axes.capsule_gaps(ends[0], ends[1], self._tool_radii)
 
     def least(self, q: Array) -> Clearance:
         """Smallest distance of all monitored pairs at q (12)."""

@@ -32,6 +32,7 @@ from controller.work.point_queue import TOLD_MOVED, PointQueue
 from controller.work.posture_search import CutPlan, Known, NextCut, Permit, PostureSearch, Unreachable, escape_pose
 from controller.work.step_result import StepResult
 from controller.work.survey import Survey
+from controller.work.tries import Tried
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.messages.perception import CloseUpResult
@@ -39,6 +40,7 @@ from rolling_panda.messages.types import Reason
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.map_frame import MapFrame
 from rolling_panda.model.robot import ARM_Q, ARM_XI
+from rolling_panda.model.wire_values import vector3
 
 #: A cut command is repeated this often until the bridge has seen it (s).
 _REPEAT_S = 0.05
@@ -944,18 +946,19 @@ class CutSequence:
         ways_in = Travel | CloseUp | Advance
         return self._stage.yields and (not isinstance(self._stage, ways_in) or self._parts.gave_way < _PUSHES)
 
-    def pushed(self, contact: ContactMonitor, trail: Trail) -> m.Reason | None:
-        """React to the push of a known cane: on the way to a cut give it up and go back, on the way out go on.
+    def pushed(self, contact: ContactMonitor, trail: Trail, frame: MapFrame) -> m.Reason | None:
+        """React to the push of a known cane: on the way to a cut put it off and go back, on the way out go on.
 
         Args:
             contact: What the arm feels, with the push.
             trail: The way here.
+            frame: Where odom is in map.
 
         Returns:
             What is logged; None without news.
         """
         parts, stage, push = self._parts, self._stage, contact.push
-        if push is None or isinstance(stage, GivingWay):
+        if push is None or push.axis is None or isinstance(stage, GivingWay):
             return None
         what = push.part, push.obstacle, float(np.linalg.norm(push.force))
         if push is self._pushed or not isinstance(stage, Travel | CloseUp | Advance):
@@ -964,13 +967,13 @@ class CutSequence:
             if not contact.beyond:
                 contact.gave_way(free=True)
             return reasons.cane_on_way_out(*what) if news else None
-        why = reasons.cane_in_way(*what)
         parts.gave_way += 1
         parts.next_cut.forget()
         parts.close_ups.forget(stage.point_id)
-        parts.queue.resolve(stage.point_id, "FAILED_NOT_CUT", why)
+        start, end = (vector3(frame.position_in_map(np.array(each))) for each in push.axis)
         self._stage = GivingWay(parts, contact, tuple(trail))
-        return reasons.point_not_cut(stage.point_id, why)
+        tried = Tried(stage.plan.approach, (start, end))
+        return parts.queue.put_off(stage.point_id, tried, reasons.cane_met(*what), reasons.cane_in_way(*what))
 
     def hold(self) -> None:
         """Stand for one period in place of `step`. A close-up or a cut that was asked for goes on."""

@@ -91,6 +91,7 @@ class Movement:
             config.whole_body.joint_margin,
             self._clearance.too_near,
             self._clearance.tool_too_near,
+            self._clearance.tool_room,
         )
         self.sequence = CutSequence(
             config, search, body.follower, body.saturation, queue, run_id, known, permit, planned_from
@@ -236,7 +237,7 @@ class Movement:
 
     def _work(self, robot: Measured, now: float) -> MotionResult:
         contact = self.body.contact
-        if (told := self.sequence.pushed(contact, self.body.trail)) is not None:
+        if (told := self.sequence.pushed(contact, self.body.trail, robot.frame)) is not None:
             self._event_log.log(told)
         work = self.sequence.step(robot, now)
         contact.gives_way, contact.among = self.sequence.may_give_way, bool(self.sequence.in_canes)

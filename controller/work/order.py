@@ -1,7 +1,7 @@
 """Joins the order that operators want with the planner's, and keeps the approach directions that they have chosen."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 from controller.ledger.journal import ApproachRow, Journal, OrderRow
 from rolling_panda import reasons
@@ -78,7 +78,7 @@ class WorkOrder:
         self._change((), "")
         return None
 
-    def arranged(self, along: Sequence[str], accepted: Callable[[str], bool]) -> list[str]:
+    def arranged(self, along: Sequence[str], accepted: Callable[[str], bool], last: Collection[str] = ()) -> list[str]:
         """All points in their order.
 
         By hand or held, those that people have not seen in their order come after it. By plan, accepted points that it
@@ -87,17 +87,19 @@ class WorkOrder:
         Args:
             along: All points along the row.
             accepted: Whether a point is accepted.
+            last: Points that come last unless people have put them elsewhere.
         """
         places = [name for name in along if accepted(name)]
         known = set(places)
         wanted = [name for name in self._planned if name in known]
         lead = [*self._by_hand, *(name for name in self._held if name not in self._by_hand)]
-        if lead:
+        if lead or last:
             among = set(wanted)
             following = iter(wanted)
             planned = [next(following) if name in among else name for name in places]
             first = [name for name in lead if name in known]
             begun = set(first)
+            planned.sort(key=lambda name: name in last)
             wanted = [*first, *(name for name in planned if name not in begun)]
         among = set(wanted)
         following = iter(wanted)

@@ -11,6 +11,7 @@ from controller.config import WorkConfig
 from controller.ledger.journal import EventLogger, Journal, TicketRow
 from controller.work.order import Approaches, WorkOrder
 from controller.work.rule_history import RuleHistory
+from controller.work.tries import Tried, Tries
 from rolling_panda import commands as intents
 from rolling_panda import reasons
 from rolling_panda.commands import POINT_STATES, Handler, Handlers
@@ -27,6 +28,8 @@ _SAME_PLACE = 0.005
 _ELSEWHERE = 0.03
 #: The operator is told of an accepted cut that is seen farther than this from where it was accepted (m).
 TOLD_MOVED = 0.005
+#: Times that a cut is tried before it is given up, where a cane is in the way.
+TRIES = 2
 #: States in which a point is shown from the record if perception does not report it: a person has to decide.
 _ASKED: frozenset[PointState] = frozenset({"ACCEPTED", "UNREACHABLE", "UNKNOWN"})
 #: States with an acceptance and no cut yet. The acceptance is valid while the point is as the operator saw it.
@@ -81,6 +84,8 @@ class PointQueue:
         """From where cuts are to be made."""
         self.order = WorkOrder(self._journal)
         """How the accepted points are ordered; `sort` after it has changed."""
+        self.tries = Tries()
+        """What came of earlier tries of the accepted cuts."""
         self._rules: RuleHistory[Ticket] = RuleHistory()
         self._restored: list[str] = []
 
@@ -329,6 +334,8 @@ class PointQueue:
             if ticket is None or ticket.state not in BOUND or ticket.accepted != point or point.point_id == busy:
                 continue
             why = refused.get(point.point_id)
+            if why and (tried := len(self.tries.of(point.point_id))):
+                why = reasons.given_up_after(tried, why)
             if why and (ticket.state, ticket.reason) != ("UNREACHABLE", why):
                 self._put(point.point_id, replace(ticket, state="UNREACHABLE", reason=why))
             elif not why and ticket.state == "UNREACHABLE":
@@ -359,8 +366,30 @@ class PointQueue:
         self._put(point_id, replace(self._tickets[point_id], state=state, reason=reason))
 
     def again(self, point_id: str, reason: Reason) -> None:
-        """CUTTING → ACCEPTED: it stands after a cut, and is cut once more as it was accepted."""
+        """Still or again ACCEPTED: it stands, and is cut as it was accepted."""
         self._put(point_id, replace(self._tickets[point_id], state="ACCEPTED", reason=reason))
+
+    def put_off(self, point_id: str, tried: Tried, again: Reason, why: Reason) -> Reason:
+        """A try has come to nothing: the cut stays accepted, for another try after the others; the last one ends it.
+
+        Args:
+            point_id: Of the point.
+            tried: The try.
+            again: Reason while it is to be tried again.
+            why: Reason where it was the last try.
+
+        Returns:
+            What is logged.
+        """
+        tries = (*self.tries.of(point_id), tried)
+        if len(tries) >= TRIES:
+            why = reasons.given_up_after(len(tries), why)
+            self.resolve(point_id, "FAILED_NOT_CUT", why)
+            return reasons.point_not_cut(point_id, why)
+        self.tries.put(point_id, tries)
+        self.again(point_id, again)
+        self.sort()
+        return reasons.cut_ended(point_id, again)
 
     def void(self, point_id: str, why: Reason) -> None:
         """ACCEPTED or UNREACHABLE → PROPOSED: the point differs from the accepted one."""
@@ -478,6 +507,8 @@ class PointQueue:
             return reasons.point_state(point_id, ticket.state)
         self._entries = None
         why = self.approaches.turn(point_id, azimuth, user)
+        if not why:
+            self.tries.put(point_id, ())
         if not why and ticket.state == "UNREACHABLE":
             # Another approach may reach it; the next plan decides.
             self._put(point_id, replace(ticket, state="ACCEPTED", reason=None))
@@ -486,7 +517,8 @@ class PointQueue:
     def sort(self) -> None:
         """Sort all points into the order of work."""
         along = sorted(self._order, key=self._place)
-        order = self.order.arranged(along, lambda name: self._tickets[name].state == "ACCEPTED")
+        put_off = {name for name, _ in self.tries.made}
+        order = self.order.arranged(along, lambda name: self._tickets[name].state == "ACCEPTED", put_off)
         if order != self._order:
             self._order, self._entries = order, None
 
@@ -501,6 +533,8 @@ class PointQueue:
         before = self._tickets.get(point_id)
         if before != ticket:
             self._entries = None
+        if ticket.state not in {*BOUND, "CUTTING"}:
+            self.tries.put(point_id, ())
         if before is None or _recorded(before) != _recorded(ticket):
             self._record(point_id, ticket, ticket.state)
         self._tickets[point_id] = ticket

@@ -9,7 +9,7 @@ The search is a generator that yields after each iteration, so that a control pe
 
 import math
 from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import product
 from typing import Any
@@ -21,7 +21,9 @@ from controller.config import HierarchyConfig, WorkConfig
 from controller.motion.surroundings import Surroundings
 from controller.whole_body.collision import CollisionModel, Pair
 from controller.whole_body.collision_geometry import BLADES
+from controller.whole_body.obstacle import Axes, Obstacle
 from controller.work.point_queue import PointQueue, Ticket
+from controller.work.tries import Approach, Line, Tried
 from rolling_panda import reasons
 from rolling_panda.errors import InputError
 from rolling_panda.messages.perception import Capsule, Obstacles, PruningPoint
@@ -42,6 +44,11 @@ class CutPoses:
     clear: Any
     stand_off: Any
     cut: Any
+
+    @property
+    def way(self) -> tuple[Any, Any, Any]:
+        """The three in the order of the way in."""
+        return self.clear, self.stand_off, self.cut
 
 
 def cut_poses(
@@ -115,8 +122,6 @@ def escape_pose(config: WorkConfig, T_odom_tool: Any, frame: MapFrame, deeper: f
 
 #: Positions of the cut ahead of the axle (m), in order of preference.
 OFFSETS = (0.15, 0.05, 0.25, -0.05, 0.35, -0.15, 0.45)
-#: Turn about the cane, tilt out of the plane square to it, and lean of the blades about the approach (rad).
-Approach = tuple[float, float, float]
 #: Approaches in order of preference. A cut may lean by 15° (spur-pruning practice); coming from below brings high
 #: points into reach, and either way passes a wire.
 APPROACHES: tuple[Approach, ...] = (
@@ -136,6 +141,9 @@ TILTS = (0.0, 0.2, 0.26, -0.26)
 #: Where none of these has room: turns, tilts and leans in all combinations, the smallest first. On a stub the blades
 #: lean more, as a person's shears do, to pass the cane that stays.
 _TURNS, _TILTS, _LEANS, _STUB_LEANS = (0.0, 0.35, 0.7), (0.0, 0.13, 0.26), (0.0, 0.13, 0.26), (0.0, 0.15, 0.3, 0.44)
+#: An approach that differs from a tried one by this is another one (rad), and room beside a cane that was met which is
+#: enough (m): how far canes lean and swing, and what the map may err.
+_ANOTHER, _ENOUGH = 0.2, 0.03
 #: Largest distance from the arm's shoulder to its wrist, with elbow and wrist offsets (m, Panda), and from the
 #: wrist to the flange (m).
 _ARM_LENGTH, _WRIST_TO_FLANGE = 0.3266 + 0.3928 + 0.088, 0.107
@@ -176,6 +184,7 @@ class CutPlan:
         q_cut: Configuration (12) at the cut, with the base pose of the stand-off.
         joint_margin: Smallest distance to a joint limit along the approach (rad).
         manipulability: Smallest ω of the arm along the approach.
+        approach: From where it is.
     """
 
     poses: CutPoses
@@ -184,14 +193,15 @@ class CutPlan:
     q_cut: Array
     joint_margin: float
     manipulability: float
+    approach: Approach = (0.0, 0.0, 0.0)
 
     def in_odom(self, frame: MapFrame) -> "CutPlan":
         """The plan in odom of one in map."""
         if frame.T_map_odom is None:
             return self
-        poses = CutPoses(*(frame.pose_in_odom(T) for T in (self.poses.clear, self.poses.stand_off, self.poses.cut)))
+        poses = CutPoses(*map(frame.pose_in_odom, self.poses.way))
         q_clear, q_stand_off, q_cut = map(frame.configuration_in_odom, (self.q_clear, self.q_stand_off, self.q_cut))
-        return CutPlan(poses, q_clear, q_stand_off, q_cut, self.joint_margin, self.manipulability)
+        return replace(self, poses=poses, q_clear=q_clear, q_stand_off=q_stand_off, q_cut=q_cut)
 
 
 @dataclass(frozen=True)
@@ -218,6 +228,7 @@ class PostureSearch:
         joint_margin: float,
         too_near: Callable[[CutPlan], tuple[float, Reason | None]] = lambda _: (0.0, None),
         tool_too_near: Callable[[CutPoses, PruningPoint], tuple[float, Reason | None]] = lambda *_: (0.0, None),
+        tool_room: Callable[[CutPoses, Sequence[Line]], float] = lambda *_: 0.0,
     ) -> None:
         """Remember the model and the row's direction.
 
@@ -228,8 +239,10 @@ class PostureSearch:
             too_near: How much of a required distance a plan lacks (m), with its place and parts; None if it lacks none.
                 Another plan is not returned.
             tool_too_near: The same for the tool alone at the poses of a cut of a point, where no posture helps.
+            tool_room: Least distance of the tool from canes with these axes on its way into a cut (m).
         """
         self._robot, self._config, self._too_near, self._tool_too_near = robot, config, too_near, tool_too_near
+        self._tool_room = tool_room
         c, s = np.cos(config.row_heading), np.sin(config.row_heading)
         self._along, self._left = np.array([c, s, 0.0]), np.array([-s, c, 0.0])
         self._base_id = robot.frame_id("base_link")
@@ -243,7 +256,7 @@ class PostureSearch:
         self._upper = robot.limits.upper[ARM_Q] - margin
 
     def find(
-        self, point: PruningPoint, q: Array, azimuth: float | None = None
+        self, point: PruningPoint, q: Array, azimuth: float | None = None, tried: Sequence[Tried] = ()
     ) -> Generator[None, None, CutPlan | Unreachable]:
         """Search, yielding once an iteration.
 
@@ -251,6 +264,7 @@ class PostureSearch:
             point: The cut.
             q: Current configuration (12, map): the base keeps its distance to the row.
             azimuth: Turn of the approach about the cane (rad) set by a person; None leaves it to the search.
+            tried: Tries in vain: what is found is another approach, with room beside the canes that were met.
         """
         position, tangent = np.array(point.position), np.array(point.tangent)
         best: CutPlan | None = None
@@ -260,12 +274,16 @@ class PostureSearch:
         lateral = float(base @ self._left)
         config = self._config
         usual = len(APPROACHES if azimuth is None else TILTS)
-        for tried, approach in enumerate(approaches(azimuth, point.kind)):
+        wanted = approaches(azimuth, point.kind)
+        if tried:
+            wanted = yield from self._others(wanted, tried, position, tangent)
+            usual = len(wanted)
+        for number, approach in enumerate(wanted):
             # More approaches help where something is in the way, not where the arm does not get there.
-            if tried == usual and not passed_over:
+            if number == usual and not passed_over:
                 break
             try:
-                poses = cut_poses(position, tangent, self._left, config.stand_off, config.clearance, *approach)
+                poses = self._poses(position, tangent, approach)
             except InputError:
                 return Unreachable(reasons.no_square_approach())
             lacking, nearest = self._tool_too_near(poses, point)
@@ -283,6 +301,7 @@ class PostureSearch:
                     plan = yield from self._try(poses, start, seed)
                     if plan is None:
                         continue
+                    plan = replace(plan, approach=approach)
                     lacking, nearest = self._too_near(plan)
                     if nearest is not None:
                         passed_over.append((lacking, nearest))
@@ -298,6 +317,26 @@ class PostureSearch:
             return Unreachable(reasons.no_clear_posture(min(passed_over, key=lambda each: each[0])[1]))
         distance = float(position @ self._left) - lateral
         return Unreachable(reasons.out_of_reach(distance, float(position[2])))
+
+    def _poses(self, position: Array, tangent: Array, approach: Approach) -> CutPoses:
+        config = self._config
+        return cut_poses(position, tangent, self._left, config.stand_off, config.clearance, *approach)
+
+    def _others(
+        self, wanted: Sequence[Approach], tried: Sequence[Tried], position: Array, tangent: Array
+    ) -> Generator[None, None, tuple[Approach, ...]]:
+        """Those that are others than the tried ones: with the most room beside the canes that were met first."""
+        met = [each.cane for each in tried]
+        room: dict[Approach, float] = {}
+        for approach in wanted:
+            if min(math.dist(approach, each.approach) for each in tried) < _ANOTHER:
+                continue
+            try:
+                room[approach] = min(self._tool_room(self._poses(position, tangent, approach), met), _ENOUGH)
+            except InputError:
+                break
+            yield
+        return tuple(sorted(room, key=lambda each: -room[each]))
 
     def _too_far(self, goal: Any, q: Array) -> bool:
         """Whether the stretched arm would not get there, which saves most of a vain search."""
@@ -367,6 +406,8 @@ def completed(search: Generator[None, None, CutPlan | Unreachable]) -> CutPlan |
 CLEARANCE = 0.02
 #: Margin above the smallest distance of the guard (m): close to it the robot is very slow.
 _ROOM = 0.003
+#: Radius of a cane of which only the axis is told, and distance from the bark up to which a cut is on it (m).
+_THIN, _OWN = 0.005, 0.015
 #: By so much a posture may miss a pose (m).
 _INEXACT = 0.0005
 #: A cane is between the closing blades where its axis comes into a box around the middle of a cut, with these half
@@ -431,6 +472,13 @@ class CutClearance:
         for where, pose in places:
             found.append(self._lacking(where, *self._surroundings.model.tool_distances(pose, self._within), _INEXACT))
         return max(found, key=lambda each: each[0])
+
+    def tool_room(self, poses: CutPoses, axes: Sequence[Line]) -> float:
+        """Least distance of the tool from some canes on its way into a cut (m); infinite from the cane that is cut."""
+        canes = Axes(tuple(Obstacle("", "cane", start, end, _THIN) for start, end in axes))
+        own = canes.gaps(poses.cut.translation[None], np.zeros(1))[0] < _OWN
+        gaps = np.array([self._surroundings.model.tool_gaps(pose, canes).min(axis=0) for pose in poses.way])
+        return float(np.where(own, np.inf, gaps).min())
 
     def _lacking(
         self, where: reasons.Place, distances: Array, pairs: Sequence[Pair], inexact: float = 0.0
@@ -554,7 +602,8 @@ class NextCut:
             if self.found is not None:
                 return True
             azimuth = self._queue.approaches.of(ticket.point.point_id)
-            self._finding = self._search.find(ticket.accepted, q, azimuth)
+            tried = self._queue.tries.of(ticket.point.point_id)
+            self._finding = self._search.find(ticket.accepted, q, azimuth, tried)
         return True
 
     @property

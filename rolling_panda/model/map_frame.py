@@ -55,6 +55,11 @@ class MapFrame:
         """T_odom_x (pin.SE3) of T_map_x."""
         return T_map_x if self.T_map_odom is None else self.T_map_odom.actInv(T_map_x)
 
+    def position_in_map(self, position: Array) -> Array:
+        """A position (3, m) in map of one in odom."""
+        out: Array = position if self.T_map_odom is None else self.T_map_odom.act(position)
+        return out
+
     def position_in_odom(self, position: Array) -> Array:
         """A position (3, m) in odom of one in map."""
         out: Array = position if self.T_map_odom is None else self.T_map_odom.actInv(position)

@@ -5,8 +5,10 @@ import pytest
 
 from controller.config import ControllerConfig
 from controller.whole_body.collision import CollisionModel
+from controller.whole_body.collision_geometry import TOOL
 from controller.whole_body.obstacle import Obstacle
 from controller.work.posture_search import CutClearance, CutPlan, PostureSearch, Unreachable, completed
+from controller.work.tries import Tried
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import Capsule, Obstacles
 from rolling_panda.model.robot import ARM_Q, RobotModel
@@ -22,18 +24,18 @@ def wire(height, y=0.75):
     return Capsule("wire", (-0.2, y, height), (2.0, y, height), 0.004, 0.004)
 
 
-def find(*capsules, tangent=(0.0, 0.1, 1.0), azimuth=None, kind="spur cut", cane=0):
+def find(*capsules, tangent=(0.0, 0.1, 1.0), azimuth=None, kind="spur cut", cane=0, tried=()):
     """A plan for the point, on spur 1 of vine 1, among these."""
     clearance = CutClearance(RobotModel(), CONFIG.whole_body.hierarchy)
     message = Obstacles(header=m.Header(0.0, "odom"), capsules=capsules)
     clearance.update(Received(message, 0.0))
     q = np.zeros(12)
     q[ARM_Q] = CONFIG.work.home
-    checks = clearance.too_near, clearance.tool_too_near
+    checks = clearance.too_near, clearance.tool_too_near, clearance.tool_room
     search = PostureSearch(RobotModel(), CONFIG.work, CONFIG.whole_body.joint_margin, *checks)
     along = tuple((np.array(tangent) / np.linalg.norm(tangent)).tolist())
     cut = point("p1", tuple(POINT.tolist()), along, vine=1, spur=1, cane=cane, kind=kind)
-    return completed(search.find(cut, q, azimuth))
+    return completed(search.find(cut, q, azimuth, tried))
 
 
 def nearest(plan, capsule):
@@ -147,6 +149,34 @@ def test_an_approach_set_by_a_person_is_kept_and_only_the_blades_lean():
     for plan in (free, beside):
         approach = plan.poses.cut.rotation[:, 2]
         assert np.arctan2(approach @ across / np.linalg.norm(across), approach[1]) == pytest.approx(turned, abs=0.02)
+
+
+def room(plan, cane):
+    """Distance of the tool at the cut from the axis of a cane (m)."""
+    model = CollisionModel(RobotModel())
+    model.set_obstacles([Obstacle("met", "post", *cane, 1e-6)])
+    near = model.distances(plan.q_cut, 0.5)
+    return min(d for d, pair in zip(near.distance, near.pairs, strict=True) if "met" in pair and pair[0] in TOOL)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_after_a_cane_was_met_the_next_way_is_another_one_with_more_room_beside_it(side):
+    x, y, z = (POINT + [0.06 * side, -0.05, 0.0]).tolist()
+    cane = (x, y, z - 0.2), (x, y, z + 0.2)
+    first = find()
+    again = find(tried=(Tried(first.approach, cane),))
+    assert isinstance(again, CutPlan)
+    assert room(again, cane) > room(first, cane) + 0.01
+    np.testing.assert_allclose(again.poses.cut.translation, POINT)
+    third = find(tried=(Tried(first.approach, cane), Tried(again.approach, cane)))
+    assert third.approach not in (first.approach, again.approach)
+
+
+def test_an_approach_set_by_a_person_is_kept_after_a_cane_was_met():
+    x, y, z = (POINT + [0.06, -0.05, 0.0]).tolist()
+    tried = Tried((0.2, 0.0, 0.0), ((x, y, z - 0.2), (x, y, z + 0.2)))
+    again = find(azimuth=0.2, tried=(tried,))
+    assert isinstance(again, CutPlan) and again.approach[0] == 0.2 and again.approach[1:] != (0.0, 0.0)
 
 
 def test_a_wire_in_the_way_from_everywhere_is_said_to_be():

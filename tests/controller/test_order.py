@@ -13,6 +13,7 @@ from controller.ledger.journal import ApproachRow, Journal, OrderRow
 from controller.planning.cuts import CutPlanner
 from controller.planning.work_plan import PlanRequest
 from controller.work.order import LARGEST, Approaches, WorkOrder
+from controller.work.tries import Tried
 from rolling_panda import commands as intents
 from rolling_panda import reasons
 from rolling_panda.config import RobotConfig
@@ -97,6 +98,15 @@ def test_a_restart_keeps_the_order_and_its_count():
     assert after.state == before.state
 
 
+def test_what_was_tried_comes_last_unless_people_put_it_elsewhere():
+    order = WorkOrder(Journal())
+    assert order.arranged(NAMES, everything, {"b", "d"}) == list("acefbd")
+    order.plan(tuple("fedcba"))
+    assert order.arranged(NAMES, everything, {"f"}) == list("edcbaf")
+    order.move("f", "e", 0, "ada", tuple("edcbaf"))
+    assert order.arranged(NAMES, everything, {"f"}) == list("fedcba")
+
+
 @given(st.lists(st.tuples(st.sampled_from(NAMES), st.sampled_from(("", *NAMES))), max_size=8), st.permutations(NAMES))
 def test_nothing_is_lost_or_doubled_and_each_move_is_what_was_asked(moves, planned):
     order = WorkOrder(Journal())
@@ -151,6 +161,22 @@ def test_the_plan_says_at_once_what_a_turn_means():
     assert math.degrees(azimuth_of(straight.cuts[0].cut.poses.cut.homogeneous)) == pytest.approx(0.0, abs=1.0)
     assert azimuth_of(turned.cuts[0].cut.poses.cut.homogeneous) == pytest.approx(0.5, abs=0.02)
     assert turned.digest != straight.digest
+
+
+def test_the_plan_puts_a_cut_that_was_tried_last_and_comes_from_elsewhere():
+    q = np.zeros(12)
+    q[ARM_Q] = CONFIG.work.home
+    planner, far = CutPlanner(CONFIG, RobotConfig()), point("b", (1.5, 0.75, 1.05))
+    before = planner.plan(PlanRequest(1, q, (POINT, far)))
+    tries = (("a", (Tried(before.cuts[0].cut.approach, ((0.45, 0.7, 0.8), (0.45, 0.7, 1.3))),)),)
+    after = planner.plan(PlanRequest(1, q, (POINT, far), tries=tries))
+    assert [cut.point.point_id for cut in before.cuts] == ["a", "b"]
+    assert [cut.point.point_id for cut in after.cuts] == ["b", "a"]
+    assert all(cut.rollout.cut_s is not None for cut in after.cuts)
+    assert math.dist(after.cuts[1].cut.approach, before.cuts[0].cut.approach) > 0.15
+    assert after.digest != before.digest
+    by_hand = planner.plan(PlanRequest(1, q, (POINT, far), order=("a", "b"), tries=tries))
+    assert [cut.point.point_id for cut in by_hand.cuts] == ["a", "b"]
 
 
 def test_what_cannot_be_turned_is_refused():

@@ -1,7 +1,9 @@
 """When a preview may be followed: what an approval holds for, and each way in which it expires."""
 
+import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from msgspec import structs
 
@@ -14,12 +16,15 @@ from rolling_panda import commands as intents
 from rolling_panda import reasons
 from rolling_panda.config import RobotConfig
 from rolling_panda.messages.perception import Capsule
+from rolling_panda.model.robot import ARM_Q
+from rolling_panda.model.wire_values import arm_torques
 from rolling_panda.reasons import text_of
-from tests.support.controller_at_work import CONFIG, entry
+from tests.support.controller_at_work import CONFIG, entry, run_until
 from tests.support.points import point
 from tests.support.previewed import ROLLOUT, Previewed
 
-POINTS = (point("a", (0.45, 0.75, 1.05)), point("b", (0.75, 0.75, 1.1)))
+PLACES = (0.45, 0.75, 1.05), (0.75, 0.75, 1.1)
+POINTS = point("a", PLACES[0]), point("b", PLACES[1])
 
 TOO_NEAR = reasons.obstacle_in_way("wire", "blades", "b", 7.0)
 
@@ -131,6 +136,24 @@ def test_a_point_accepted_anew_or_not_any_more_ends_it(p):
     assert p.state.phase == "expired" and p.state.reason == reasons.no_longer_accepted("a")
     p.ask(intents.AcceptPoint, point_id="a", revision=2)
     assert p.state.phase == "expired"
+
+
+def test_a_cane_that_is_met_ends_it_as_the_cut_is_made_another_way(rolled):
+    canes = tuple(Capsule("cane", (x, 0.75, 0.85), (x, 0.75, z - 0.01), 0.004, 0.004, 1, 1) for x, _, z in PLACES)
+    p = required(Previewed(POINTS, roll=rolled, obstacles=canes, external_torque=(0.0,) * 7))
+    r, shown = p.robot, p.previewed("a")
+    assert p.ask(intents.ApprovePreview, preview_hash=shown.preview_hash) == ""
+    assert p.ask(intents.Start) == ""
+    while math.dist((tool := r.model.kinematics(r.q)).T_odom_tool.translation, PLACES[0]) > 0.04:
+        r.step()
+        assert r.now < 20.0
+    r.external_torque = arm_torques(tool.J[:3, ARM_Q].T @ np.array([0.0, -28.0, 0.0]))
+    r.run(0.3)
+    r.external_torque = (0.0,) * 7
+    run_until(r, lambda state: state.mode != "AUTO", 30.0)
+    assert entry(r, "a").state == "ACCEPTED" and entry(r, "a").reason.code == "cane_met"
+    assert r.state.reason == reasons.preview_expired(reasons.approach_turned_after("a"))
+    assert p.state.phase == "expired" and r.cuts == []
 
 
 def post_at(x, y):
