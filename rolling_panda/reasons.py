@@ -2730,6 +2730,11 @@ def cane_met(part: str, other: str, force_n: float) -> None:
 
 
 @_reason("warning", "")
+def missed_once(why: Reason) -> None:
+    """{why}. The cut is tried again another way."""
+
+
+@_reason("warning", "")
 def given_up_after(tries: float, why: Reason) -> None:
     """After {tries:.0f} {tries:try|tries}: {why}."""
 

@@ -69,7 +69,8 @@ class _Run:
     def __init__(self, config: ControllerConfig, robot_config: RobotConfig, request: PreviewRequest) -> None:
         self._configs, self._request, self._dt = (config, robot_config), request, 1.0 / config.rate_hz
         self._journal = Journal()
-        self._queue = PointQueue(config.work, self._journal)
+        # What is not reached at once is refused: the plan is of one try.
+        self._queue = PointQueue(config.work, self._journal, tries=1)
         self._queue.update(m.PruningPoints(header=m.Header(), segmenter="", frames=0, points=request.points))
         for point in request.points:
             self._queue.accept(point.point_id, point.revision, "preview")

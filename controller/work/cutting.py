@@ -670,8 +670,11 @@ class Advance(MovingStage):
             return Cutting(parts, self._task, self._way), result
         if timeout.late(now):
             reason = missed("the cut", tracking)
-            parts.queue.resolve(self.point_id, "FAILED_NOT_CUT", reason)
-            return self._retreat(robot), result.with_event(reasons.point_not_cut(self.point_id, reason))
+            tried = Tried(self._task.planned.approach)
+            told = parts.queue.put_off(self.point_id, tried, reasons.missed_once(reason), reason)
+            # Nothing that was found before leads to the next try.
+            parts.next_cut.forget()
+            return self._retreat(robot), result.with_event(told)
         return self, result
 
 

@@ -28,8 +28,8 @@ _SAME_PLACE = 0.005
 _ELSEWHERE = 0.03
 #: The operator is told of an accepted cut that is seen farther than this from where it was accepted (m).
 TOLD_MOVED = 0.005
-#: Times that a cut is tried before it is given up, where a cane is in the way.
-TRIES = 2
+#: Times that a cut is tried before it is given up, where it is not reached.
+_TRIES = 3
 #: States in which a point is shown from the record if perception does not report it: a person has to decide.
 _ASKED: frozenset[PointState] = frozenset({"ACCEPTED", "UNREACHABLE", "UNKNOWN"})
 #: States with an acceptance and no cut yet. The acceptance is valid while the point is as the operator saw it.
@@ -70,9 +70,9 @@ class Ticket:
 class PointQueue:
     """All points by id. Every change of state has a reason and is recorded."""
 
-    def __init__(self, config: WorkConfig, journal: Journal | None = None) -> None:
-        """Start empty; changes are recorded in `journal`."""
-        self._config = config
+    def __init__(self, config: WorkConfig, journal: Journal | None = None, tries: int = _TRIES) -> None:
+        """Start empty; changes are recorded in `journal`, and a cut is tried at most so many times."""
+        self._config, self._most_tries = config, tries
         self._journal = journal or Journal()
         self.perceived: PruningPoints | None = None
         """What perception told last."""
@@ -382,8 +382,8 @@ class PointQueue:
             What is logged.
         """
         tries = (*self.tries.of(point_id), tried)
-        if len(tries) >= TRIES:
-            why = reasons.given_up_after(len(tries), why)
+        if len(tries) >= self._most_tries:
+            why = reasons.given_up_after(len(tries), why) if len(tries) > 1 else why
             self.resolve(point_id, "FAILED_NOT_CUT", why)
             return reasons.point_not_cut(point_id, why)
         self.tries.put(point_id, tries)

@@ -326,15 +326,16 @@ class PostureSearch:
         self, wanted: Sequence[Approach], tried: Sequence[Tried], position: Array, tangent: Array
     ) -> Generator[None, None, tuple[Approach, ...]]:
         """Those that are others than the tried ones: with the most room beside the canes that were met first."""
-        met = [each.cane for each in tried]
+        met = [each.cane for each in tried if each.cane is not None]
         room: dict[Approach, float] = {}
         for approach in wanted:
             if min(math.dist(approach, each.approach) for each in tried) < _ANOTHER:
                 continue
             try:
-                room[approach] = min(self._tool_room(self._poses(position, tangent, approach), met), _ENOUGH)
+                poses = self._poses(position, tangent, approach)
             except InputError:
                 break
+            room[approach] = min(self._tool_room(poses, met), _ENOUGH) if met else _ENOUGH
             yield
         return tuple(sorted(room, key=lambda each: -room[each]))
 

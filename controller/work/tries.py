@@ -15,11 +15,11 @@ class Tried(Struct, frozen=True):
 
     Attributes:
         approach: From where it was.
-        cane: Axis of the cane that was met (m, map).
+        cane: Axis of the cane that was met (m, map); None where the cut was not reached for another reason.
     """
 
     approach: Approach
-    cane: Line
+    cane: Line | None = None
 
 
 #: Points with their tries, by id.

@@ -7,7 +7,7 @@ from controller.motion.follower import MotionTimeout, Tracking, missed
 from rolling_panda import reasons
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.reasons import text_of
-from tests.support.controller_at_work import entry, run_until, working
+from tests.support.controller_at_work import entry, finish, run_until, working
 from tests.support.points import point
 
 TIMEOUT, DT = 6.0, 0.01
@@ -87,3 +87,14 @@ def test_a_post_beside_the_way_is_told_as_the_reason_within_seconds():
         assert r.now < 20.0
     assert entry(r, "a").state == "FAILED_NOT_CUT" and "post 0" in text_of(entry(r, "a").reason)
     assert held is not None and r.now - held < 4.0
+
+
+def test_a_cut_that_was_not_reached_is_tried_another_way():
+    """A wire is seen over the cut when the tool is on its way in already."""
+    r = working((point("a", (0.3, 0.785, 1.169)),))
+    run_until(r, lambda s: s is not None and s.phase == "ADVANCE", 20.0)
+    r.obstacles = (Capsule("wire", (-0.2, 0.75, 1.2), (2.0, 0.75, 1.2), 0.004, 0.004),)
+    run_until(r, lambda s: entry(r, "a").reason is not None, 20.0)
+    assert entry(r, "a").state == "ACCEPTED" and entry(r, "a").reason.code == "missed_once"
+    finish(r, 60.0)
+    assert entry(r, "a").state == "DONE" and len(r.cuts) == 1

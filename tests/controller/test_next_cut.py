@@ -15,7 +15,7 @@ class Searches:
     def __init__(self) -> None:
         self.begun = 0
 
-    def find(self, position, tangent, q, azimuth=None, kind="spur cut"):
+    def find(self, position, tangent, q, azimuth=None, kind="spur cut", tried=()):
         self.begun += 1
         return self.look()
 
