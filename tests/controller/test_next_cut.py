@@ -15,7 +15,7 @@ class Searches:
     def __init__(self) -> None:
         self.begun = 0
 
-    def find(self, position, tangent, q, azimuth=None, kind="spur cut", tried=()):
+    def find(self, point, q, azimuth=None, tried=()):
         self.begun += 1
         return self.look()
 
