@@ -207,7 +207,7 @@ def cut_arc(cane: Cane, config: RuleConfig) -> float | Reason:
             return reasons.pruned_already(1000 * beyond, kept)
         if beyond < config.visible_beyond:
             return reasons.beyond_node_hidden(kept)
-    if (reason := _miscount_reason(cane, nodes, config)) is not None:
+    if (reason := miscount_reason(cane, nodes, config)) is not None:
         return reason
     midway = internode is not None and internode < config.short_internode
     arc = last.arc + (internode / 2 if midway and internode is not None else config.offset)
@@ -222,7 +222,7 @@ def cut_arc(cane: Cane, config: RuleConfig) -> float | Reason:
     return arc
 
 
-def _miscount_reason(cane: Cane, nodes: tuple[Node, ...], config: RuleConfig) -> Reason | None:
+def miscount_reason(cane: Cane, nodes: tuple[Node, ...], config: RuleConfig) -> Reason | None:
     """Why the count of nodes up to the cut is unreliable; None if it is not."""
     arcs = [node.arc for node in nodes[: config.nodes_kept + 1]]
     gaps = np.diff(arcs)

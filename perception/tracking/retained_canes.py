@@ -17,7 +17,7 @@ from perception.arrays import Array, Labels, distance, interpolate
 from perception.config import ObstacleConfig, RuleConfig
 from perception.plant.map import KnownCane, KnownSpur
 from perception.plant.numbering import SpurNumber
-from perception.rules.pruning import count_nodes
+from perception.rules.pruning import count_nodes, miscount_reason
 from perception.segmentation.frame import View
 from perception.tracking.presence import wood_presence
 from perception.tracking.tracker import Proposal
@@ -38,6 +38,8 @@ _SPACING, _PRESENCE_STRIDE = 0.005, 4
 _GONE_SHARE, _MIN_VISIBLE, _GONE_FRAMES = 0.7, 3, 3
 #: Canes whose base is farther from the camera are not checked (m).
 _MAX_RANGE = 1.6
+#: Length of a cane that tells where its hidden rest goes, and most of that rest that is told (m).
+_DIRECTION, _LONGEST_HIDDEN = 0.03, 0.06
 #: Longest internode (m), for a cane whose nodes were not all seen.
 _MAX_INTERNODE = 0.10
 #: Canes of two spurs whose bases are farther apart than this are two (m).
@@ -155,10 +157,8 @@ class RetainedCanes:
             for cane, known in zip(canes, spur.canes, strict=True):
                 cane.observations = known.base.count
                 removed = decided and np.isinf(cane.cut) and not cane.keeper
-                confirmed = (
-                    2 * cane.observations >= spur.position.count
-                    and cane.observations >= self._config.min_hits + cane.gone_at
-                )
+                seen_often = cane.keeper or 2 * cane.observations >= spur.position.count
+                confirmed = seen_often and cane.observations >= self._config.min_hits + cane.gone_at
                 if removed or not confirmed:
                     cane.withdraw()
                 else:
@@ -184,7 +184,7 @@ def _retained_length(cane: _Cane, known: KnownCane, rule: RuleConfig) -> float:
         return cane.cut - _BLADES
     kept = rule.fruiting_nodes if rule.system == "guyot" else rule.nodes_kept
     nodes = count_nodes(known.as_cane(), rule)
-    if len(nodes) >= kept:
+    if len(nodes) >= kept and (rule.system == "guyot" or miscount_reason(known.as_cane(), nodes, rule) is None):
         return nodes[kept - 1].arc + rule.offset - _BLADES
     return rule.basal_bud_distance + kept * _MAX_INTERNODE
 
@@ -213,12 +213,18 @@ def _publish(cane: _Cane, known: KnownCane, end: float, number: SpurNumber, unde
 
 
 def _sampled(known: KnownCane, end: float) -> Array:
-    """The axis up to an arc length (K×3, m)."""
+    """The axis up to an arc length (K×3, m), straight on where its end was hidden."""
     best = known.best
-    start = float(best.arc[0])
+    start, beyond = float(best.arc[0]), end - best.length
     end = min(max(end, start), best.length)
     arcs = np.linspace(start, end, max(2, round((end - start) / _SPACING) + 1))
-    return interpolate(arcs, best.arc, best.axis)
+    axis = interpolate(arcs, best.arc, best.axis)
+    if beyond <= 0.0 or best.end != "hidden" or np.isfinite(known.cut_at):
+        return axis
+    # What hides the end of a cane does not end it.
+    along = best.at(best.length) - best.at(best.length - _DIRECTION)
+    steps = np.arange(_SPACING, min(beyond, _LONGEST_HIDDEN), _SPACING)[:, None]
+    return np.concatenate([axis, axis[-1] + steps * along / max(float(np.linalg.norm(along)), 1e-9)])
 
 
 def _hausdorff(first: Array, second: Array) -> float:

@@ -39,11 +39,11 @@ NODES = (0.02, 0.10, 0.18, 0.26)
 BASE, UP = np.array([0.0, 0.2, 0.8]), np.array([0.0, -1.0, 0.0])
 
 
-def cane(x=0.0, nodes=NODES, length=0.35, bend=0.0):
+def cane(x=0.0, nodes=NODES, length=0.35, bend=0.0, end="image border"):
     arc = np.linspace(0.0, length, 71)
     axis = BASE + arc[:, None] * UP
     axis[:, 0] += x + bend * (arc / length) ** 2
-    return Cane(axis, arc, 0.004, tuple(Node(node, 30) for node in nodes), (), "image border", 0.0)
+    return Cane(axis, arc, 0.004, tuple(Node(node, 30) for node in nodes), (), end, 0.0)
 
 
 def known(*canes, looks=3, number=NUMBER):
@@ -126,6 +126,25 @@ def test_a_renewal_cut_tells_which_cane_stays_though_its_own_cut_is_unknown():
 
 def test_cuts_on_other_spurs_say_nothing():
     assert told(known(cane()), cut(0.05, number=SpurNumber(2, 4))) == told(known(cane()))
+
+
+def test_a_cane_whose_end_is_hidden_goes_on_and_one_that_ends_does_not():
+    tops = {end: top(told(known(cane(nodes=(0.02, 0.1), length=0.2, end=end)))) for end in ("hidden", "free")}
+    assert tops["free"] == pytest.approx(0.2, abs=0.002)
+    assert tops["hidden"] == pytest.approx(0.255, abs=0.006), "as far as the rule may leave it"
+    far = top(told(known(cane(nodes=(0.02,), length=0.1, end="hidden"))))
+    assert far == pytest.approx(0.16, abs=0.006), "nobody knows where it goes farther on"
+
+
+def test_nodes_too_near_to_each_other_do_not_tell_how_much_stays():
+    assert top(told(known(cane(nodes=(0.02, 0.08, 0.11, 0.19))))) == pytest.approx(0.255, abs=0.002)
+
+
+def test_a_cane_that_a_cut_is_for_counts_though_most_looks_did_not_show_it():
+    plants = known(cane(), cane(0.05), looks=3)
+    for _ in range(5):
+        plants.update(Plant((Spur(BASE, None, 0.007, (cane(),)),), np.zeros((0, 3)), ()), (NUMBER,))
+    assert {round(c.end[0], 2) for c in told(plants, cut(0.2, 0.05))} == {0.05}
 
 
 @pytest.mark.parametrize("aside", [0.003, 0.02])
