@@ -41,7 +41,6 @@ from rolling_panda import messages as m
 from rolling_panda.commands import SURE
 from rolling_panda.config import load_section
 from rolling_panda.errors import InputError
-from rolling_panda.messages.supervision import SessionPlan
 from tests.support.worlds.closed_loop import ClosedLoop
 
 Training = Literal["spur", "guyot"]
@@ -329,8 +328,7 @@ class Reviewer:
 
 def _planned(loop: ClosedLoop) -> bool:
     """Whether the plan of the accepted cuts is valid."""
-    told = loop.inbox.newest(SessionPlan)
-    return told is not None and told.message.state == "valid"
+    return loop.session_plan is not None and loop.session_plan.state == "valid"
 
 
 def _stands(row: Row, point: m.PruningPoint) -> bool:

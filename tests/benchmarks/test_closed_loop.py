@@ -33,7 +33,8 @@ def accept(loop: ClosedLoop, count: int) -> list[m.QueueEntry]:
 def test_nothing_moves_before_start_and_then_the_cane_is_severed_where_it_was_accepted(tmp_path: Path) -> None:
     loop = surveyed(3, tmp_path / "trace")
     (entry,) = accept(loop, 1)
-    loop.run(1.0)
+    planned = loop.run_until(lambda: loop.session_plan is not None and loop.session_plan.state == "valid", 4.0)
+    assert planned, "nobody planned the accepted cut"
     started = loop.now
     assert loop.command(intents.Start(user="test")).ok
     assert loop.run_until(lambda: any(loop.queue("DONE", "FAILED_NOT_CUT", "UNKNOWN")), 40.0)

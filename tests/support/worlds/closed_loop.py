@@ -20,7 +20,7 @@ from rolling_panda.closing import Closing
 from rolling_panda.config import RobotConfig, load_section
 from rolling_panda.messages.perception import BASE, Obstacles
 from rolling_panda.messages.robot import CameraFrame
-from rolling_panda.messages.supervision import Person, Presence
+from rolling_panda.messages.supervision import Person, Presence, SessionPlan
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.resources import resource
@@ -114,6 +114,7 @@ class ClosedLoop(RobotWorld, Closing):
         self.perception = Perception(seeing, choose_segmenter(segmenter or seeing.segmenter, weights))
         self.add("perception", PerceptionInTime(self.perception), _PERCEPTION_PERIOD_S)
         self.state: m.ControllerState | None = None
+        self.session_plan: SessionPlan | None = None
         self.events: list[m.LogEvent] = []
 
     def tick(self) -> None:
@@ -129,10 +130,12 @@ class ClosedLoop(RobotWorld, Closing):
                 self._watch(self, tracking)
 
     def say(self, message: m.Message) -> None:
-        """Send a message; the controller's state and all events are kept."""
+        """Send a message; the controller's state, its plan and all events are kept."""
         super().say(message)
         if isinstance(message, m.ControllerState):
             self.state = message
+        elif isinstance(message, SessionPlan):
+            self.session_plan = message
         elif isinstance(message, m.LogEvent):
             self.events.append(message)
 
