@@ -204,27 +204,25 @@ def _publish(cane: _Cane, known: KnownCane, end: float, number: SpurNumber, unde
         return
     cane.axis, cane.radius = axis, radius
     corners = _simplify(axis)
+    pieces = [(start, stop, undecided) for start, stop in zip(corners, corners[1:], strict=False)]
+    # What hides the end of a cane does not end it; where it goes is not sure.
+    rest = min(end - known.best.length, _LONGEST_HIDDEN)
+    if rest > 0.0 and known.best.end == "hidden" and np.isinf(known.cut_at):
+        along = axis[-1] - known.best.at(known.best.length - _DIRECTION)
+        pieces.append((axis[-1], axis[-1] + rest * along / max(float(np.linalg.norm(along)), 1e-9), True))
     cane.capsules = tuple(
-        Capsule(
-            "cane", vector3(start), vector3(stop), radius, radius, number.vine, number.spur, undecided, known.number
-        )
-        for start, stop in zip(corners, corners[1:], strict=False)
+        Capsule("cane", vector3(start), vector3(stop), radius, radius, number.vine, number.spur, unsure, known.number)
+        for start, stop, unsure in pieces
     )
 
 
 def _sampled(known: KnownCane, end: float) -> Array:
-    """The axis up to an arc length (K×3, m), straight on where its end was hidden."""
+    """The axis up to an arc length (K×3, m)."""
     best = known.best
-    start, beyond = float(best.arc[0]), end - best.length
+    start = float(best.arc[0])
     end = min(max(end, start), best.length)
     arcs = np.linspace(start, end, max(2, round((end - start) / _SPACING) + 1))
-    axis = interpolate(arcs, best.arc, best.axis)
-    if beyond <= 0.0 or best.end != "hidden" or np.isfinite(known.cut_at):
-        return axis
-    # What hides the end of a cane does not end it.
-    along = best.at(best.length) - best.at(best.length - _DIRECTION)
-    steps = np.arange(_SPACING, min(beyond, _LONGEST_HIDDEN), _SPACING)[:, None]
-    return np.concatenate([axis, axis[-1] + steps * along / max(float(np.linalg.norm(along)), 1e-9)])
+    return interpolate(arcs, best.arc, best.axis)
 
 
 def _hausdorff(first: Array, second: Array) -> float:

@@ -297,7 +297,7 @@ class Capsule(Struct, frozen=True, forbid_unknown_fields=True):
         end_radius: Radius at `end` (m).
         vine: Number of the vine, as in pruning points; -1 for none.
         spur: Number of the spur that it grows from; -1 for none.
-        undecided: True for canes of an undecided site, which may be cut later.
+        undecided: True for canes of an undecided site, which may be cut later, and for the hidden rest of any cane.
         cane: Number of the cane on that spur, as in pruning points; -1 if unknown.
     """
 
