@@ -118,6 +118,21 @@ def test_a_cut_severs_what_is_between_the_blades_and_the_trace_says_so(tmp_path:
     assert (event["severed"][0]["vine"], event["severed"][0]["spur"]) == (1, 2)
 
 
+def test_a_bite_into_a_severed_cane_that_hangs_severs_nothing_by_the_trace(tmp_path: Path) -> None:
+    tool = robot().true_tool()
+    at, across = tool[:3, 3], tool[:3, 1]
+    aside = 0.03 * tool[:3, 0]
+    cane = Rod("cane", at - aside - 0.1 * across, at - aside + 0.4 * across, 0.004, 0.003, vine=1, spur=2, cane=0)
+    sim = robot(Row((cane,)).sever(0, 0.1, aside), TraceWriter(tmp_path / "t"))
+    sim.cut("c1", "p1")
+    for _ in range(700):
+        sim.write(setpoint())
+    assert sim.read().outcome == "DONE" and sim.scenery()[0] == 2
+    sim.close()
+    (event,) = read(tmp_path / "t").events
+    assert event["severed"] == []
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_servos_stay_calm_in_any_posture(seed: int) -> None:
     low, high = [-2.0, -1.0, -2.0, -2.6, -2.5, 0.8, -2.5], [2.0, 0.6, 2.0, -0.8, 2.5, 3.0, 2.5]

@@ -417,6 +417,7 @@ class SimulatedRobot:
                     "point": item.point.tolist(),
                 }
                 for item in result.severed
+                if not item.rod.hanging
             ],
         }
 

@@ -28,6 +28,7 @@ class Rod:
         vine: Vine along the row, -1 for posts, wires and ground.
         spur: Spur on the vine, -1 for none.
         cane: Cane on the spur, -1 for none.
+        hanging: Severed, and held by the wires.
     """
 
     kind: WoodClass
@@ -39,6 +40,7 @@ class Rod:
     vine: int = -1
     spur: int = -1
     cane: int = -1
+    hanging: bool = False
 
     def at(self, fraction: float) -> tuple[Array, float]:
         """Point on the axis (3, m) and radius (m) at a fraction 0…1 of the length."""
@@ -88,9 +90,9 @@ class Row:
                 rod = self.rods[i]
                 assert rod is not None
                 parent = -1 if rod.parent == index else rod.parent
-                rods[i] = replace(rod, start=rod.start + hangs, end=rod.end + hangs, parent=parent)
-            beyond = replace(cut, start=point + hangs, end=cut.end + hangs, start_radius=radius, parent=-1)
-            rods.append(beyond)
+                rods[i] = replace(rod, start=rod.start + hangs, end=rod.end + hangs, parent=parent, hanging=True)
+            start, end = point + hangs, cut.end + hangs
+            rods.append(replace(cut, start=start, end=end, start_radius=radius, parent=-1, hanging=True))
         return Row(tuple(rods), self.revision + 1, self.backdrop)
 
     def _beyond(self, index: int, cut: Rod, fraction: float) -> set[int]:
