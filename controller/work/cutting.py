@@ -364,8 +364,8 @@ class Stage(ABC):
         return stage, result.with_event(why)
 
     def _fail(self, robot: Measured, point_id: str, reason: m.Reason) -> "Step":
-        self._parts.queue.resolve(point_id, "FAILED_NOT_CUT", reason)
-        return Escape(self._parts), self._parts.brake(robot).with_event(reasons.point_not_cut(point_id, reason))
+        told = self._parts.queue.give_up(point_id, reason)
+        return Escape(self._parts), self._parts.brake(robot).with_event(told)
 
 
 #: Stage of the next period, and the result of this one.

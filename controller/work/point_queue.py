@@ -334,8 +334,7 @@ class PointQueue:
             if ticket is None or ticket.state not in BOUND or ticket.accepted != point or point.point_id == busy:
                 continue
             why = refused.get(point.point_id)
-            if why and (tried := len(self.tries.of(point.point_id))):
-                why = reasons.given_up_after(tried, why)
+            why = why and self._after_tries(point.point_id, why)
             if why and (ticket.state, ticket.reason) != ("UNREACHABLE", why):
                 self._put(point.point_id, replace(ticket, state="UNREACHABLE", reason=why))
             elif not why and ticket.state == "UNREACHABLE":
@@ -381,15 +380,23 @@ class PointQueue:
         Returns:
             What is logged.
         """
-        tries = (*self.tries.of(point_id), tried)
-        if len(tries) >= self._most_tries:
-            why = reasons.given_up_after(len(tries), why) if len(tries) > 1 else why
-            self.resolve(point_id, "FAILED_NOT_CUT", why)
-            return reasons.point_not_cut(point_id, why)
-        self.tries.put(point_id, tries)
+        self.tries.put(point_id, (*self.tries.of(point_id), tried))
+        if len(self.tries.of(point_id)) >= self._most_tries:
+            return self.give_up(point_id, why)
         self.again(point_id, again)
         self.sort()
         return reasons.cut_ended(point_id, again)
+
+    def give_up(self, point_id: str, why: Reason) -> Reason:
+        """ACCEPTED → FAILED_NOT_CUT: it is not tried again. Returns what is logged."""
+        why = self._after_tries(point_id, why)
+        self.resolve(point_id, "FAILED_NOT_CUT", why)
+        return reasons.point_not_cut(point_id, why)
+
+    def _after_tries(self, point_id: str, why: Reason) -> Reason:
+        """The reason why a cut is not made, with how often it was tried."""
+        tries = len(self.tries.of(point_id))
+        return reasons.given_up_after(tries, why) if tries and self._most_tries > 1 else why
 
     def void(self, point_id: str, why: Reason) -> None:
         """ACCEPTED or UNREACHABLE → PROPOSED: the point differs from the accepted one."""

@@ -439,6 +439,18 @@ def test_a_cut_that_canes_are_in_the_way_of_from_everywhere_is_given_up_and_says
     assert min(turn(one, other) for one, other in itertools.combinations(ways, 2)) > 0.15, "each try is another one"
 
 
+def test_a_cut_that_has_no_other_way_after_a_push_says_so_and_that_it_was_tried():
+    pushed = Pushed(28.0, "ADVANCE", count=1)
+    r = pushed.run(lambda s: s is not None and any(e.reason is not None for e in s.queue))
+    assert entry(r, "a").reason.code == "cane_met"
+    pushed.run(lambda _: r.model.pose(r.q, r.model.tool_id).translation[1] < 0.58)
+    fence = (Capsule("cane", (0.03 * k, 0.68, 0.9), (0.03 * k, 0.68, 1.4), 0.004, 0.004, 1, 9 + k) for k in range(30))
+    r.obstacles = (*CANES, *fence)
+    pushed.run(lambda s: s.mode != "AUTO")
+    told = dict(entry(r, "a").reason.values)
+    assert entry(r, "a").state == "FAILED_NOT_CUT" and told["tries"] == 1 and told["why"].code == "not_reachable"
+
+
 def test_a_given_up_cut_that_is_accepted_again_is_tried_anew():
     pushed = Pushed(28.0, "ADVANCE", count=1, most=3)
     r = pushed.run(lambda s: s is not None and s.mode == "READY" and pushed.r.now > 1.0)
