@@ -16,10 +16,10 @@ from bridge.real.config import RealConfig
 from bridge.sim.camera.config import CameraConfig
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.world.config import load_world
-from rolling_panda.calibration.file import load_base, save_base
+from rolling_panda.calibration.file import load_robot, save_robot
 from rolling_panda.config import RobotConfig, load_section
 from rolling_panda.errors import RollingPandaError
-from rolling_panda.messages.robot import BaseCalibration
+from rolling_panda.messages.robot import AnyCalibration
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.reasons import text_of
 from rolling_panda.resources import resource
@@ -126,22 +126,22 @@ def _core(
     arguments, rejections = context.arguments, context.transport.rejections
     folder, robot_id = context.state_folder, arguments.robot_id
     drawn = RobotModel(load_section(context.config_path, "robot", RobotConfig)).drive.sizes
-    base, disk = load_base(folder, robot_id, drawn), ThreadPoolExecutor(1, "calibration")
+    calibrated, disk = load_robot(folder, robot_id, drawn), ThreadPoolExecutor(1, "calibration")
 
-    def keep(base: BaseCalibration) -> "Future[None]":
-        return disk.submit(save_base, folder, robot_id, base)
+    def keep(calibration: AnyCalibration) -> "Future[None]":
+        return disk.submit(save_robot, folder, robot_id, calibration)
 
     # Imported here: the real bridge must not need the simulator, and vice versa.
     if arguments.kind == "real":
         from bridge.real.build import real_bridge
 
         moving, fakes = not arguments.readonly, arguments.fakes
-        core = real_bridge(context.config_path, context.wire, moving, rejections, cuts, memory, fakes, base, keep)
+        core = real_bridge(context.config_path, context.wire, moving, rejections, cuts, memory, fakes, calibrated, keep)
         return core, lambda pressed: None
     from bridge.sim.build import press_button, simulated_bridge
 
     seed, trace = arguments.seed, arguments.trace
-    core = simulated_bridge(context.config_path, seed, trace, "process", rejections, cuts, memory, base, keep)
+    core = simulated_bridge(context.config_path, seed, trace, "process", rejections, cuts, memory, calibrated, keep)
     return core, functools.partial(press_button, core)
 
 

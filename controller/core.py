@@ -49,6 +49,7 @@ from rolling_panda.commands import COMMAND_OF, Condition, Handlers
 from rolling_panda.config import RobotConfig
 from rolling_panda.errors import ControlError
 from rolling_panda.messages.perception import (
+    ARM,
     CALIBRATION,
     CHECK,
     CloseUpRequest,
@@ -277,6 +278,8 @@ class Controller:
             intents.CheckCamera: functools.partial(self._look_around, CHECK),
             intents.CalibrateBase: lambda asked, now: self._begin(asked, now, self._movement.sequence.drive_around),
             intents.UseBase: self._use_base,
+            intents.CalibrateArm: functools.partial(self._look_around, ARM),
+            intents.UseArm: self._use_arm,
             intents.Pause: self._pause,
             intents.Home: self._home,
             intents.Reset: lambda asked, now: self._supervisor.stops.ask_release(asked, self._supervisor.bridge, now),
@@ -398,13 +401,26 @@ class Controller:
     def _look_around(self, prefix: str, asked: intents.Start, now: float) -> m.Reason | None:
         return self._begin(asked, now, functools.partial(self._movement.look_around, prefix))
 
-    def _use_base(self, asked: intents.UseBase, now: float) -> m.Reason | None:
-        """Have the bridge use the base's calibration that the operator saw; its log tells what becomes of it."""
+    @property
+    def _offers(self) -> RobotCalibration:
+        """New calibrations of the robot."""
         found = self._inbox.newest(RobotCalibration)
-        base = None if found is None else found.message.base
+        return RobotCalibration(header=m.Header()) if found is None else found.message
+
+    def _use_base(self, asked: intents.UseBase, now: float) -> m.Reason | None:
+        """Have the bridge use the calibration that the operator saw; its log tells what becomes of it."""
+        base = self._offers.base
         if base is None or base.made_at != asked.made_at:
             return reasons.no_base_offered()
         self._calibration_due = m.UseCalibration(user=asked.user, base=base)
+        return None
+
+    def _use_arm(self, asked: intents.UseArm, now: float) -> m.Reason | None:
+        """The same of the arm."""
+        arm = self._offers.arm
+        if arm is None or arm.made_at != asked.made_at:
+            return reasons.no_arm_offered()
+        self._calibration_due = m.UseCalibration(user=asked.user, arm=arm)
         return None
 
     def _begin(self, asked: intents.Intent, now: float, work: Callable[[], None]) -> m.Reason | None:

@@ -46,6 +46,7 @@ from rolling_panda.commands import (
     UseCamera,
 )
 from rolling_panda.messages.perception import (
+    ARM,
     BASE,
     CALIBRATION,
     CHECK,
@@ -168,8 +169,10 @@ class Perception:
         self.camera_rays.add(frame)
         self.row_frame.predict(_base(frame), view.stamp)
         self.withdrawn = ()
+        if self.camera.follow(frame.joint_offsets):
+            self._forget()
         # The calibration's board hides the row.
-        if frame.point_id.startswith((CALIBRATION, BASE)) or -view.R[2, 1] < self._config.min_upright:
+        if frame.point_id.startswith((CALIBRATION, BASE, ARM)) or -view.R[2, 1] < self._config.min_upright:
             return self.points()
         try:
             labels = self.segmenter.segment(view)
@@ -244,8 +247,11 @@ class Perception:
         """
         if frame.point_id.startswith(CALIBRATION):
             return self.camera.look(frame)
-        if frame.point_id.startswith(BASE):
-            return self.calibrator.look(frame)
+        if frame.point_id.startswith((BASE, ARM)):
+            result = self.calibrator.look(frame)
+            if self.calibrator.mount is not None:
+                self.camera.measured_with_arm(self.calibrator.mount)
+            return result
         if frame.point_id.startswith(CHECK):
             # The picture itself tells, as one of a survey.
             return CloseUpResult(
@@ -255,7 +261,7 @@ class Perception:
                 finding="seen",
             )
         point = self._tracker.find(frame.point_id)
-        if point is None:
+        if point is None or not self.camera.fits(frame.joint_offsets):
             return failed_check(frame, reasons.point_unknown_to_perception())
         view = decode_frame(frame, self._model)
         self.row_frame.predict(_base(frame), view.stamp)
@@ -339,11 +345,15 @@ class Perception:
         """Use another calibration. What was seen by the old one is forgotten, but for the obstacles."""
         answer = self.camera.use(request.made_at)
         if answer.ok:
-            self.withdrawn = self._tracker.withdraw_all()
-            self.plant_map, self._spur_pictures, self._undecided = PlantMap(), SpurPictures(), UndecidedSites()
-            self._undo, self._severed, self._cane_lines, self._site_messages = [], [], (), ()
-            self.row_frame.forget()
+            self._forget()
         return answer
+
+    def _forget(self) -> None:
+        """Forget all wood but the obstacles: camera or arm have another calibration than it was seen by."""
+        self.withdrawn = self._tracker.withdraw_all()
+        self.plant_map, self._spur_pictures, self._undecided = PlantMap(), SpurPictures(), UndecidedSites()
+        self._undo, self._severed, self._cane_lines, self._site_messages = [], [], (), ()
+        self.row_frame.forget()
 
     def _add(self, request: AddPoint) -> m.Answer:
         ray = Ray(np.array(request.origin), np.array(request.direction))
@@ -471,7 +481,7 @@ class Perception:
         return self._undecided.remaining({SpurNumber(point.vine, point.spur) for point in points})
 
     def _apply(self, update: TrackerUpdate) -> None:
-        self.withdrawn = update.withdrawn
+        self.withdrawn += update.withdrawn
         for position in update.severed:
             found = self.plant_map.nearest_cane(position)
             if found is not None:

@@ -384,6 +384,23 @@ class UseBase(Intent, frozen=True, kw_only=True):
     made_at: WallTime
 
 
+class CalibrateArm(Start, frozen=True, kw_only=True):
+    """READY → AUTO. Look at the calibration's board with many postures of the arm, to measure the zeros of its joints.
+
+    The base stands still. It cuts nothing.
+    """
+
+
+class UseArm(Intent, frozen=True, kw_only=True):
+    """Use the new calibration of the arm's joints from now on. It moves nothing. All points are looked for anew.
+
+    Attributes:
+        made_at: `made_at` of the calibration that the operator saw.
+    """
+
+    made_at: WallTime
+
+
 class Pause(Intent, frozen=True, kw_only=True):
     """AUTO or TELEOP → PAUSED."""
 
@@ -590,6 +607,8 @@ COMMANDS: Final[tuple[Command, ...]] = (
     Command(CheckCamera, "mode", "/camera/check", control=True, event=Event.START, conditions=_WATCHED_MOTION),
     Command(CalibrateBase, "mode", "/base/calibrate", control=True, event=Event.START, conditions=_WATCHED_MOTION),
     Command(UseBase, "mode", "/base/use", modes=("IDLE", "READY", "PAUSED")),
+    Command(CalibrateArm, "mode", "/arm/calibrate", control=True, event=Event.START, conditions=_WATCHED_MOTION),
+    Command(UseArm, "mode", "/arm/use", modes=("IDLE", "READY", "PAUSED")),
     Command(Pause, "mode", "/pause", event=Event.PAUSE),
     Command(Resume, "mode", "/resume", control=True, event=Event.RESUME),
     Command(

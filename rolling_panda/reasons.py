@@ -2524,7 +2524,7 @@ def calibration_used(turn: float, shift: float) -> None:
 
 @_reason("info", "")
 def withdrawn_for_calibration(point: str) -> None:
-    """{point} was withdrawn, as the camera has a new calibration."""
+    """{point} was withdrawn, as camera or arm have a new calibration."""
 
 
 @_reason("warning", "see that the board is in the picture from everywhere, and calibrate again")
@@ -2590,6 +2590,36 @@ def calibration_refused(cause: Reason) -> None:
 @_reason("info", "")
 def base_calibration_used(radius: float, track: float) -> None:
     """The base's new calibration is in use: its wheels are {radius:.2f} % larger, {track:.2f} % wider apart."""
+
+
+@_reason("warning", "give the arm room to look from all around, and calibrate again")
+def arm_postures_alike(sd: float, most: float) -> None:
+    """The postures do not tell the arm's joints apart: ± {sd:.2f}° at best; allowed: {most:g}°."""
+
+
+@_reason("warning", "see that the board is flat and does not move, with light on it, and calibrate again")
+def arm_unsure(sd: float, most: float) -> None:
+    """The zeros of the arm's joints are uncertain by {sd:.2f}°; allowed: {most:g}°."""
+
+
+@_reason("warning", "see that the board is of the right size and stands still; else have the arm serviced")
+def arm_far(joint: float, offset: float, most: float) -> None:
+    """By the board the zero of joint {joint:.0f} is off by {offset:.1f}°; at most {most:.0f}° are believed."""
+
+
+@_reason("info", "calibrate the arm first")
+def no_arm_offered() -> None:
+    """There is no new calibration of the arm to use."""
+
+
+@_reason("info", "")
+def arm_calibration_used(change: float) -> None:
+    """The arm's new calibration is in use: its joints are up to {change:.2f}° from where they were taken to be."""
+
+
+@_reason("warning", "use the camera's new calibration on the screen Engineer, or calibrate the camera again")
+def camera_of_other_arm() -> None:
+    """The camera was calibrated with other zeros of the arm's joints, and no longer fits."""
 
 
 @_reason("warning", "cuts may miss")

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bridge.config import BridgeConfig
-from bridge.core.calibration import WheelCalibration
+from bridge.core.calibration import Calibration
 from bridge.core.camera_trigger import CameraTrigger, Posture
 from bridge.core.cut_orders import FORGETFUL, CutMemory, CutOrders
 from bridge.core.interface import Measurement, Robot, Setpoint
@@ -93,7 +93,7 @@ class BridgeCore:
         memory: KeptValue[Remembered] | None = None,
         relaxed_limits: tuple[m.Reason, ...] = (),
         draw: Callable[[], str] = draw_id,
-        wheels: WheelCalibration | None = None,
+        calibration: Calibration | None = None,
     ) -> None:
         """Start with the watchdog tripped, at rest, without a stop.
 
@@ -109,10 +109,10 @@ class BridgeCore:
             memory: State that survives a restart; None keeps nothing.
             relaxed_limits: Safety limits that the configuration sets less strictly than usual, to report.
             draw: Draws the random part of the bridge's own stops.
-            wheels: Calibration of the wheels; None takes them to be as drawn.
+            calibration: Of wheels and joints; None takes them to be as drawn.
         """
         self.robot = robot
-        self._wheels = wheels or WheelCalibration(odometer.drive.sizes, float(limits.velocity[0]))
+        self._calibration = calibration or Calibration(odometer.drive.sizes, float(limits.velocity[0]))
         self.refusals = Refusals(rejections)
         self.kind = kind
         self._odometer = odometer
@@ -142,7 +142,7 @@ class BridgeCore:
         self._stops_due = True
         self._desired: Array = np.zeros_like(limits.velocity)
         self._was_tripped = True
-        self._measured = self._wheels.measured(robot.read())
+        self._measured = self._calibration.measured(robot.read())
         self._odometer.follow(self._measured.position[:2])
         self._cut_id = ""
         self._outcome: m.Outcome = ""
@@ -253,8 +253,11 @@ class BridgeCore:
 
     def on_calibration(self, request: m.UseCalibration) -> m.Answer:
         """Use a calibration of the robot once it is on disk; at rest only."""
-        moves = bool(np.any(self._limiter.sent))
-        refused = reasons.calibration_in_motion() if moves else self._wheels.request(request.base)
+        refused = None
+        if bool(np.any(self._limiter.sent)):
+            refused = reasons.calibration_in_motion()
+        elif (asked := request.base or request.arm) is not None:
+            refused = self._calibration.request(asked)
         return m.Answer(ok=refused is None, reason=refused)
 
     def answer(self, request: m.ReleaseStop | m.UseCalibration, now: float) -> m.Answer:
@@ -267,22 +270,23 @@ class BridgeCore:
         """Advance one tick of 1 ms; `clock` is `now` unless given, `wall_time` (s since 1970) is for people."""
         self._clock, self._wall = now if clock is None else clock, wall_time
         if now - self._stepped > _STANDSTILL_S:
-            self._measured = self._wheels.measured(self.robot.read())
+            self._measured = self._calibration.measured(self.robot.read())
             self._limiter.restart(self._measured.velocity)
         self._stepped = now
         self._watch_button(now)
         tripped = self._watch(now)
         stopped = bool(self._latch.stop_id)
         speed_scale = 0.0 if stopped or self._faults.current else self._watchdog.trust(now)
-        xi = self._limiter.step(speed_scale * self._desired, self._measured.position[2:])
+        arm = self._calibration.own_angles(self._measured.position[2:])
+        xi = self._limiter.step(speed_scale * self._desired, arm)
         blades = not (stopped or tripped)
         releases = self._faults.releases
-        real = self._wheels.commanded(xi)
+        real = self._calibration.commanded(xi)
         self.robot.write(Setpoint(real, blades, self._fence.epoch, self._validator.sequence, self._clock, releases))
-        self._measured = self._wheels.measured(self.robot.read())
+        self._measured = self._calibration.measured(self.robot.read())
         self._ticks += 1
         self._follow_cut()
-        if (used := self._wheels.kept(not xi.any())) is not None:
+        if (used := self._calibration.kept(not xi.any())) is not None:
             self._log(used)
             self._state_due = True
         return self._outputs(now)
@@ -418,7 +422,8 @@ class BridgeCore:
             holder=self._fence.holder if self._fence_kept else "",
             sequence=max(0, self._validator.sequence),
             moving=moving,
-            base=self._wheels.base,
+            base=self._calibration.base,
+            arm=self._calibration.arm,
         )
 
     def _watch_mode(self, moving: bool, now: float) -> None:
@@ -440,7 +445,8 @@ class BridgeCore:
             m.Header(now, "camera"),
             self._odometer.pose,
             actuated(measured.position),
-            self._wheels.sizes,
+            self._calibration.sizes,
+            self._calibration.joint_offsets,
         )
         self._camera_trigger.follow(posture)
         expose = self._camera_trigger.due(self._ticks)

@@ -1,7 +1,8 @@
-"""Calibrated wheels: everything above the bridge sees wheels as drawn, whatever the robot's real ones are.
+"""Calibrated wheels and joints: everything above the bridge sees a robot as drawn, whatever the real one is like.
 
 Angles of the real wheels are turned into those that wheels as drawn would have turned by on the same way of the base,
-and commands the other way. Odometry and commands thus agree with the ground, and no other process has to know.
+and commands the other way. The offset of each joint's encoder is taken from its angle; a velocity has none. Odometry,
+postures and commands thus agree with the world, and no other process has to know.
 """
 
 from collections.abc import Callable
@@ -13,54 +14,71 @@ import numpy as np
 from bridge.core.interface import Measurement
 from rolling_panda import messages as m
 from rolling_panda import reasons
-from rolling_panda.calibration.file import FARTHEST_WHEELS, plausible
+from rolling_panda.calibration.file import FARTHEST_WHEELS, Calibrated, plausible
 from rolling_panda.model.differential_drive import Array, WheelSizes
 
 #: Keeps a calibration beyond a restart, on another thread; the future raises OSError where it cannot.
-Keep = Callable[[m.BaseCalibration], "Future[None]"]
+Keep = Callable[[m.AnyCalibration], "Future[None]"]
+AS_DRAWN = Calibrated()
 
 
-def forget(base: m.BaseCalibration) -> "Future[None]":
+def forget(calibration: m.AnyCalibration) -> "Future[None]":
     """For a bridge without a state folder."""
     done: Future[None] = Future()
     done.set_result(None)
     return done
 
 
-class WheelCalibration:
-    """Converts between the real wheels and those drawn. Not thread-safe."""
+class Calibration:
+    """Converts between the real robot and the one that is drawn. Not thread-safe."""
 
     def __init__(
-        self, drawn: WheelSizes, fastest: float, base: m.BaseCalibration | None = None, keep: Keep = forget
+        self, drawn: WheelSizes, fastest: float, calibrated: Calibrated = AS_DRAWN, keep: Keep = forget
     ) -> None:
-        """Use a calibration.
+        """Use the calibrations of an earlier start.
 
         Args:
             drawn: The wheels that all other processes know.
             fastest: Limit of a wheel (rad/s), which no conversion exceeds.
-            base: Of an earlier start; None takes the wheels to be as drawn.
+            calibrated: Of an earlier start.
             keep: Called with a new one before it is used.
         """
         self._drawn, self._fastest, self._keep = drawn, fastest, keep
         self._real: Array | None = None
         self._shown = np.zeros(2)
-        self._pending: tuple[m.BaseCalibration, Future[None]] | None = None
+        self._pending: tuple[m.AnyCalibration, Future[None]] | None = None
         self.base: m.BaseCalibration | None = None
-        self._take(base)
+        self.arm: m.ArmCalibration | None = None
+        self._take(calibrated.base)
+        self._take(calibrated.arm)
 
-    def _take(self, base: m.BaseCalibration | None) -> None:
-        self.base = base
+    def _take(self, calibration: m.AnyCalibration | None) -> None:
+        if isinstance(calibration, m.BaseCalibration):
+            self.base = calibration
+        elif calibration is not None:
+            self.arm = calibration
+        base = self.base
         self._used = self._drawn if base is None else WheelSizes(base.left, base.right, base.track)
         self._to_drawn = np.asarray(np.linalg.solve(self._drawn.motion(), self._used.motion()), np.float64)
         self._to_real = np.asarray(np.linalg.inv(self._to_drawn), np.float64)
+        self._offsets = np.array(self.joint_offsets)
 
     @property
     def sizes(self) -> tuple[float, float, float] | None:
         """Both radii and the track in use (m); None for those drawn."""
         return None if self.base is None else (self._used.left, self._used.right, self._used.track)
 
+    @property
+    def joint_offsets(self) -> m.JointOffsets:
+        """What is taken from the encoders of the joints (rad)."""
+        return m.NO_OFFSETS if self.arm is None else self.arm.offsets
+
+    def own_angles(self, arm: Array) -> Array:
+        """Angles of the joints by their own encoders (7, rad), in which their limits hold, from those as drawn."""
+        return arm if self.arm is None else arm + self._offsets
+
     def measured(self, measurement: Measurement) -> Measurement:
-        """A measurement of the robot, with wheels as drawn. Their angles go on where they were."""
+        """A measurement of the robot, with wheels and joints as drawn. Angles of wheels go on where they were."""
         real = measurement.position[:2].copy()
         if self._real is None:
             self._shown = real
@@ -68,10 +86,12 @@ class WheelCalibration:
             turned = real - self._real
             self._shown = self._shown + (turned if self.base is None else self._to_drawn @ turned)
         self._real = real
-        if self.base is None:
+        if self.base is None and self.arm is None:
             return measurement
         position, velocity = measurement.position.copy(), measurement.velocity.copy()
-        position[:2], velocity[:2] = self._shown, self._to_drawn @ velocity[:2]
+        position[2:] -= self._offsets
+        if self.base is not None:
+            position[:2], velocity[:2] = self._shown, self._to_drawn @ velocity[:2]
         return replace(measurement, position=position, velocity=velocity)
 
     def commanded(self, xi: Array) -> Array:
@@ -84,13 +104,13 @@ class WheelCalibration:
         out[:2] = wheels * min(1.0, self._fastest / max(float(np.abs(wheels).max()), 1e-9))
         return out
 
-    def request(self, base: m.BaseCalibration) -> m.Reason | None:
+    def request(self, calibration: m.AnyCalibration) -> m.Reason | None:
         """Keep a new calibration, and use it once it is kept; returns why not."""
         if self._pending is not None:
             return reasons.calibration_under_way()
-        if not plausible(base, self._drawn):
+        if isinstance(calibration, m.BaseCalibration) and not plausible(calibration, self._drawn):
             return reasons.calibration_of_other_wheels(100 * FARTHEST_WHEELS)
-        self._pending = base, self._keep(base)
+        self._pending = calibration, self._keep(calibration)
         return None
 
     def kept(self, at_rest: bool) -> m.Reason | None:
@@ -101,7 +121,7 @@ class WheelCalibration:
         """
         if self._pending is None or not self._pending[1].done():
             return None
-        base, future = self._pending
+        calibration, future = self._pending
         failed = future.exception()
         if failed is not None:
             self._pending = None
@@ -109,7 +129,9 @@ class WheelCalibration:
         if not at_rest:
             return None
         self._pending = None
-        before = self._used
-        self._take(base)
-        radius = (base.left + base.right) / (before.left + before.right)
-        return reasons.base_calibration_used(100 * (radius - 1.0), 100 * (base.track / before.track - 1.0))
+        before, offsets = self._used, self._offsets
+        self._take(calibration)
+        if isinstance(calibration, m.ArmCalibration):
+            return reasons.arm_calibration_used(float(np.degrees(np.abs(self._offsets - offsets).max())))
+        radius = (self._used.left + self._used.right) / (before.left + before.right)
+        return reasons.base_calibration_used(100 * (radius - 1.0), 100 * (self._used.track / before.track - 1.0))

@@ -22,6 +22,7 @@ class Posture(NamedTuple):
     base: m.PlanarPose
     position: m.Actuated
     wheels: tuple[float, float, float] | None = None
+    joint_offsets: m.JointOffsets = m.NO_OFFSETS
 
 
 class CameraTrigger:
@@ -89,4 +90,5 @@ class CameraTrigger:
             point_id="" if wanted is None else wanted.point_id,
             number=0 if wanted is None else wanted.number,
             wheels=posture.wheels,
+            joint_offsets=posture.joint_offsets,
         )

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from bridge.config import BridgeConfig
 from bridge.core.bridge import TICK_S, BridgeCore
-from bridge.core.calibration import Keep, WheelCalibration, forget
+from bridge.core.calibration import AS_DRAWN, Calibration, Keep, forget
 from bridge.core.cut_orders import CutMemory
 from bridge.core.odometer import Odometer
 from bridge.core.state_memory import Remembered
@@ -22,9 +22,9 @@ from bridge.real.realsense import RealSense, open_realsense
 from bridge.real.robot import RealRobot
 from rolling_panda import reasons
 from rolling_panda.bounds import wider
+from rolling_panda.calibration.file import Calibrated
 from rolling_panda.config import RobotConfig, TransportConfig, load_section
 from rolling_panda.errors import InputError
-from rolling_panda.messages.robot import BaseCalibration
 from rolling_panda.messages.types import BridgeKind
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.reasons import text_of
@@ -128,8 +128,8 @@ def real_bridge(
     cuts: CutMemory | None = None,
     memory: KeptValue[Remembered] | None = None,
     fakes: bool = False,
-    base: BaseCalibration | None = None,
-    keep_base: Keep = forget,
+    calibrated: Calibrated = AS_DRAWN,
+    keep: Keep = forget,
 ) -> BridgeCore:
     """Assemble a bridge with the real robot.
 
@@ -141,8 +141,8 @@ def real_bridge(
         cuts: Durable memory of cuts; None keeps them for the life of the process.
         memory: Other state that survives a restart; None keeps nothing.
         fakes: Whether the devices are `bridge.fakes`; the bridge reports it.
-        base: Calibration of the wheels; None takes them to be as drawn.
-        keep_base: Keeps a new one.
+        calibrated: Calibrations of an earlier start.
+        keep: Keeps a new one.
 
     Raises:
         ConfigError: A section is wrong.
@@ -166,8 +166,10 @@ def real_bridge(
     robot = RealRobot(devices.base, devices.arm, devices.blades, devices.camera, moving)
     odometer = Odometer(model.drive, config.odometry, TICK_S)
     kind: BridgeKind = "fakes" if fakes else "real"
-    wheels = WheelCalibration(model.drive.sizes, float(model.limits.velocity[0]), base, keep_base)
-    return BridgeCore(robot, config, model.limits, odometer, kind, None, rejections, cuts, memory, told, wheels=wheels)
+    calibration = Calibration(model.drive.sizes, float(model.limits.velocity[0]), calibrated, keep)
+    return BridgeCore(
+        robot, config, model.limits, odometer, kind, None, rejections, cuts, memory, told, calibration=calibration
+    )
 
 
 def wait_for_states(devices: Devices, limit_s: float = _FIRST_STATE_S) -> None:

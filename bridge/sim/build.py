@@ -5,7 +5,7 @@ from typing import Literal
 
 from bridge.config import BridgeConfig
 from bridge.core.bridge import TICK_S, BridgeCore
-from bridge.core.calibration import Keep, WheelCalibration, forget
+from bridge.core.calibration import AS_DRAWN, Calibration, Keep, forget
 from bridge.core.cut_orders import CutMemory
 from bridge.core.odometer import Odometer
 from bridge.core.state_memory import Remembered
@@ -17,8 +17,8 @@ from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
 from bridge.sim.world.config import load_world
 from rolling_panda.bounds import wider
+from rolling_panda.calibration.file import Calibrated
 from rolling_panda.config import RobotConfig, load_section
-from rolling_panda.messages.robot import BaseCalibration
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.transport.rejections import Rejections
@@ -32,8 +32,8 @@ def simulated_bridge(
     rejections: Rejections | None = None,
     cuts: CutMemory | None = None,
     memory: KeptValue[Remembered] | None = None,
-    base: BaseCalibration | None = None,
-    keep_base: Keep = forget,
+    calibrated: Calibrated = AS_DRAWN,
+    keep: Keep = forget,
 ) -> BridgeCore:
     """Bridge core with the simulated robot beside a row grown from `seed`.
 
@@ -46,8 +46,8 @@ def simulated_bridge(
         rejections: Counters of refusals, shared with the transport.
         cuts: Cuts that survive a restart; None for this run only.
         memory: State that survives a restart; None for none.
-        base: Calibration of the wheels; None takes them to be as drawn.
-        keep_base: Keeps a new one.
+        calibrated: Calibrations of an earlier start.
+        keep: Keeps a new one.
 
     Raises:
         ConfigError: A section is wrong, or the trace cannot be written.
@@ -58,7 +58,7 @@ def simulated_bridge(
     odometer = Odometer(model.drive, config.odometry, TICK_S, seed)
     robot = simulated_robot(config_path, seed, trace, camera)
     widened = (*wider("bridge", config), *wider("robot", limits))
-    wheels = WheelCalibration(model.drive.sizes, float(model.limits.velocity[0]), base, keep_base)
+    calibration = Calibration(model.drive.sizes, float(model.limits.velocity[0]), calibrated, keep)
     return BridgeCore(
         robot,
         config,
@@ -70,7 +70,7 @@ def simulated_bridge(
         cuts,
         memory,
         widened,
-        wheels=wheels,
+        calibration=calibration,
     )
 
 

@@ -6,7 +6,7 @@ exactly is not known, and need not be: each picture is used that shows it.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from controller.work.close_up import CloseUpClient
 from controller.work.homing import Homing, go_home
 from controller.work.step_result import StepResult
 from rolling_panda import reasons
-from rolling_panda.messages.perception import CALIBRATION, CHECK
+from rolling_panda.messages.perception import ARM, CALIBRATION, CHECK
 from rolling_panda.messages.types import Reason
 from rolling_panda.model.differential_drive import NQ, Array
 from rolling_panda.model.robot import ARM_Q, RobotModel
@@ -46,6 +46,7 @@ class Views:
         distances: Of the camera from it, in turn (m).
         rolls: Turns about the optical axis, in turn (degrees).
         clear: Least distance of the tool from its plane (m).
+        elbows: Turns of the shoulder out of the survey posture, in turn (rad), by which the elbow swings aside.
     """
 
     prefix: str
@@ -55,10 +56,14 @@ class Views:
     distances: tuple[float, ...]
     rolls: tuple[float, ...]
     clear: float
+    elbows: tuple[float, ...] = (0.0,)
 
 
 #: Of the board: its marks can still be read, and the views are turned enough to tell a turn about the optical axis.
 BOARD = Views(CALIBRATION, 0.45, 42, (8.0, 48.0), (0.42, 0.34, 0.54), (0.0, 35.0, -35.0, 60.0, -60.0), 0.12)
+#: The same for the joints of the arm. A swing of the elbow turns each of them without moving the camera: it tells their
+#: offsets apart from the place of the board and the mount of the camera.
+JOINTS = replace(BOARD, prefix=ARM, elbows=(0.0, 0.6, -0.6))
 #: Of the row: from so far away that whole spurs are seen, with the image upright.
 ROW = Views(CHECK, 0.75, 8, (8.0, 20.0), (0.85, 0.62, 0.75), (0.0, 12.0, -12.0), 0.24)
 
@@ -77,6 +82,7 @@ def view_postures(robot: RobotModel, home: Array, views: Views = BOARD) -> tuple
     q[ARM_Q] = home
     ahead = robot.pose(q, robot.camera_id)
     middle = ahead.translation + views.ahead * ahead.rotation[:, 2]
+    swing = _swing(robot, q)
     least, most = views.tilt
     found = []
     for index in range(views.count):
@@ -86,7 +92,9 @@ def view_postures(robot: RobotModel, home: Array, views: Views = BOARD) -> tuple
         turn = pin.exp3(np.array([0.0, 0.0, math.radians(views.rolls[index % len(views.rolls)])]))
         rotation = ahead.rotation @ lean @ turn
         place = middle - views.distances[index % len(views.distances)] * rotation[:, 2]
-        posture = _posture(robot, q, pin.SE3(rotation, place))
+        start = q.copy()
+        start[ARM_Q] += views.elbows[index % len(views.elbows)] * swing
+        posture = _posture(robot, start, pin.SE3(rotation, place))
         if posture is None:
             continue
         there = q.copy()
@@ -95,6 +103,14 @@ def view_postures(robot: RobotModel, home: Array, views: Views = BOARD) -> tuple
         if float((middle - tool) @ ahead.rotation[:, 2]) >= views.clear:
             found.append(posture)
     return _in_order(home, found)
+
+
+def _swing(robot: RobotModel, q: Array) -> Array:
+    """Direction of the arm's joints (7) that leaves the camera where it is, with 1 for the joint that turns most."""
+    J = pin.computeFrameJacobian(robot.model, robot.data, q, robot.camera_id, pin.LOCAL)[:, ARM_Q]
+    null = np.linalg.svd(J)[2][-1]
+    out: Array = null / null[np.abs(null).argmax()]
+    return out
 
 
 def _posture(robot: RobotModel, start: Array, T_odom_camera: Any) -> Array | None:

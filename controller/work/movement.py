@@ -13,7 +13,7 @@ from controller.motion.follower import Measured, Tracking
 from controller.motion.teleoperation import Teleoperation
 from controller.whole_body.task import Method
 from controller.work.back_off import BackOff
-from controller.work.camera_views import BOARD, ROW, view_postures
+from controller.work.camera_views import BOARD, JOINTS, ROW, view_postures
 from controller.work.cutting import CutSequence
 from controller.work.homing import Homing
 from controller.work.point_queue import PointQueue
@@ -108,7 +108,7 @@ class Movement:
             check.tool_refusal,
         )
         model, home = RobotModel(robot_config), np.array(config.work.home)
-        self._views = {views.prefix: view_postures(model, home, views) for views in (BOARD, ROW)}
+        self._views = {views.prefix: view_postures(model, home, views) for views in (BOARD, JOINTS, ROW)}
         self._homing: Homing | None = None
         self._backs_off, self._rested = False, 0
         self._back_off: BackOff | None = None

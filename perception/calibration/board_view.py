@@ -24,24 +24,29 @@ class BoardView:
         pixels: The same in the picture (N×2, px).
         lens: Camera matrix that the frame reports (3×3, px).
         T_odom_flange: Pose of the flange by the arm's encoders (pin.SE3).
-        base: Pose of the base in odom (3: m, m, rad).
+        q: Configuration of the robot by its encoders (12).
     """
 
     points: Array
     pixels: Array
     lens: Array
     T_odom_flange: Any
-    base: Array
+    q: Array
+
+    @property
+    def base(self) -> Array:
+        """Pose of the base in odom (3: m, m, rad)."""
+        return self.q[:3]
 
 
-def find_board(view: View, reported: Intrinsics, T_odom_flange: Any, base: Array) -> BoardView | None:
+def find_board(view: View, reported: Intrinsics, T_odom_flange: Any, q: Array) -> BoardView | None:
     """The board in a picture; None where too little of it is seen.
 
     Args:
         view: The picture.
         reported: The lens as the camera reports it: its error is a part of the calibration.
         T_odom_flange: Pose of the flange (pin.SE3).
-        base: Pose of the base in odom (3).
+        q: Configuration of the robot (12).
 
     Raises:
         CorruptFrameError: The colour image is corrupt.
@@ -55,4 +60,4 @@ def find_board(view: View, reported: Intrinsics, T_odom_flange: Any, base: Array
     k = reported
     lens = np.array([[k.fx, 0.0, k.cx], [0.0, k.fy, k.cy], [0.0, 0.0, 1.0]])
     pixels = np.asarray(found, dtype=np.float64).reshape(-1, 2)
-    return BoardView(corners()[ids.ravel()], pixels, lens, T_odom_flange, base)
+    return BoardView(corners()[ids.ravel()], pixels, lens, T_odom_flange, q)

@@ -12,14 +12,14 @@ import pinocchio as pin
 
 from perception.arrays import Array
 from perception.calibration.board_view import BoardView, find_board
-from perception.calibration.hand_eye import CalibrationError, calibrate
+from perception.calibration.hand_eye import CalibrationError, HandEye, calibrate
 from perception.calibration.monitor import MountError, MountMonitor
 from perception.segmentation.frame import View, decode_frame
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.calibration.file import FARTHEST_SHIFT, FARTHEST_TURN, OLD_S
 from rolling_panda.messages.perception import CALIBRATION, CameraMount, CameraState, CloseUpResult
-from rolling_panda.messages.robot import CameraFrame
+from rolling_panda.messages.robot import NO_OFFSETS, CameraFrame, JointOffsets
 from rolling_panda.model.robot import RobotModel, configuration, mount_pose, pose_message, turn_and_shift
 from rolling_panda.model.wire_values import vector3
 
@@ -44,6 +44,8 @@ class CameraCalibration:
         self._model, self._keep, self._clock = model, keep, clock
         self._mount: CameraMount | None = None
         self._offer: CameraMount | None = None
+        self._with_arm: CameraMount | None = None
+        self._offsets: JointOffsets | None = None
         self._refused: m.Reason | None = None
         self._views: dict[str, BoardView] = {}
         self._stamp = 0.0
@@ -79,12 +81,11 @@ class CameraCalibration:
         self._stamp = view.stamp
         if frame.point_id == f"{CALIBRATION}1":
             self._views, self._offer, self._refused = {}, None, None
-        base = frame.base.x, frame.base.y, frame.base.phi
-        flange = self._model.pose(configuration(frame.base, frame.position), self._model.flange_id)
-        found = find_board(view, frame.intrinsics, flange, np.array(base))
+        q = configuration(frame.base, frame.position)
+        found = find_board(view, frame.intrinsics, self._model.pose(q, self._model.flange_id), q)
         if found is not None:
             self._views[frame.point_id] = found
-            self._solve()
+            self._solve(frame.joint_offsets)
         return CloseUpResult(
             header=m.Header(frame.header.stamp, "odom"),
             point_id=frame.point_id,
@@ -92,6 +93,29 @@ class CameraCalibration:
             finding="unseen" if found is None else "seen",
             reason=reasons.board_not_in_picture() if found is None else None,
         )
+
+    def follow(self, offsets: JointOffsets) -> bool:
+        """The robot now takes these offsets from what the arm's encoders tell; whether it took others before.
+
+        A camera that was measured together with these offsets is offered from now on; nothing else that was measured
+        before fits.
+        """
+        before, self._offsets = self._offsets, offsets
+        if before is None or before == offsets:
+            return False
+        fits = self._with_arm is not None and self._with_arm.joint_offsets == offsets
+        self._offer, self._with_arm, self._refused = self._with_arm if fits else None, None, None
+        self._views = {}
+        self._monitor.forget()
+        return True
+
+    def measured_with_arm(self, mount: CameraMount) -> None:
+        """Take in the camera by the pictures of a new calibration of the arm; it is offered once that one is used."""
+        self._with_arm = mount
+
+    def fits(self, offsets: JointOffsets) -> bool:
+        """Whether these offsets of the joints are the ones that `follow` was told last."""
+        return self._offsets in (None, offsets)
 
     def observe(self, view: View, base: Array, axes: Sequence[Array]) -> None:
         """Compare the canes of a picture of the row with earlier ones; what is wrong is told, and corrected on offer.
@@ -133,6 +157,8 @@ class CameraCalibration:
     def _warning(self) -> m.Reason | None:
         if self._monitor.error is not None and self._monitor.error.warning is not None:
             return self._monitor.error.warning
+        if self._mount is not None and not self.fits(self._mount.joint_offsets):
+            return reasons.camera_of_other_arm()
         age_s = 0.0 if self._mount is None else self._clock() - self._mount.made_at
         return reasons.calibration_old(age_s / 86400.0) if age_s > OLD_S else None
 
@@ -154,31 +180,40 @@ class CameraCalibration:
             views=error.pictures,
             angle_sd=float(sd[:2].max()),
             shift_sd=float(sd[3:].max()),
+            joint_offsets=self._offsets or NO_OFFSETS,
         )
 
-    def _solve(self) -> None:
+    def _solve(self, offsets: JointOffsets) -> None:
         """The offer by all pictures so far, or why there is none."""
         self._offer, self._refused = None, None
         try:
             found = calibrate(tuple(self._views.values()))
+            self._offer = mount_of(found, self._model, self._clock(), offsets)
         except CalibrationError as error:
             self._refused = error.reason
-            return
-        turn, shift = turn_and_shift(self._model.T_flange_camera, found.T_flange_camera)
-        if turn > FARTHEST_TURN or shift > FARTHEST_SHIFT:
-            self._refused = reasons.calibration_far(float(np.degrees(turn)), 1e3 * shift)
-            return
-        pose = pose_message(found.T_flange_camera)
-        self._offer = CameraMount(
-            position=pose.position,
-            quat_xyzw=pose.quat_xyzw,
-            focal=found.focal,
-            made_at=self._clock(),
-            views=found.views,
-            pixels=found.pixels,
-            angle_sd=found.angle_sd,
-            shift_sd=found.shift_sd,
-        )
+
+
+def mount_of(found: HandEye, drawn: RobotModel, made_at: float, offsets: JointOffsets) -> CameraMount:
+    """The calibration of the camera that was found with these offsets of the joints (rad).
+
+    Raises:
+        CalibrationError: It is too far from where the model's camera is drawn.
+    """
+    turn, shift = turn_and_shift(drawn.T_flange_camera, found.T_flange_camera)
+    if turn > FARTHEST_TURN or shift > FARTHEST_SHIFT:
+        raise CalibrationError(reasons.calibration_far(float(np.degrees(turn)), 1e3 * shift))
+    pose = pose_message(found.T_flange_camera)
+    return CameraMount(
+        position=pose.position,
+        quat_xyzw=pose.quat_xyzw,
+        focal=found.focal,
+        made_at=made_at,
+        views=found.views,
+        pixels=found.pixels,
+        angle_sd=found.angle_sd,
+        shift_sd=found.shift_sd,
+        joint_offsets=offsets,
+    )
 
 
 def keep_nothing(mount: CameraMount) -> None:

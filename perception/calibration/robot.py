@@ -1,24 +1,47 @@
-"""The next calibration of the robot itself: pictures of the board in, an offer out, which an operator takes."""
+"""The next calibrations of the robot itself: pictures of the board in, offers out, which an operator takes."""
 
 import time
 from collections.abc import Callable
+from typing import Generic, TypeVar
 
 import numpy as np
+from msgspec.structs import replace
 
 from perception.calibration.base import BaseFit, BaseView, measure_wheels
-from perception.calibration.board_view import find_board
-from perception.calibration.hand_eye import CalibrationError
-from perception.segmentation.frame import decode_frame
+from perception.calibration.board_view import BoardView, find_board
+from perception.calibration.camera import mount_of
+from perception.calibration.hand_eye import CalibrationError, calibrate
+from perception.segmentation.frame import View, decode_frame
 from rolling_panda import messages as m
 from rolling_panda import reasons
-from rolling_panda.messages.perception import BASE, CloseUpResult, RobotCalibration
-from rolling_panda.messages.robot import CameraFrame
+from rolling_panda.messages.perception import ARM, BASE, CameraMount, CloseUpResult, RobotCalibration
+from rolling_panda.messages.robot import LARGEST_OFFSET, ArmCalibration, CameraFrame, JointOffsets
 from rolling_panda.model.differential_drive import WheelSizes
 from rolling_panda.model.robot import RobotModel, configuration
+from rolling_panda.model.wire_values import joint_offsets
+
+Seen = TypeVar("Seen")
+
+
+class _Round(Generic[Seen]):
+    """Pictures of one calibration, taken with the same one in use."""
+
+    def __init__(self, prefix: str) -> None:
+        self._first = f"{prefix}1"
+        self._used: object = None
+        self.views: dict[str, Seen] = {}
+
+    def add(self, name: str, used: object, view: Seen | None) -> tuple[Seen, ...]:
+        """All pictures so far; the first one, or another calibration in use, begins anew."""
+        if name == self._first or used != self._used:
+            self.views, self._used = {}, used
+        if view is not None:
+            self.views[name] = view
+        return tuple(self.views.values())
 
 
 class RobotCalibrator:
-    """Measures the wheels. It uses nothing itself: the bridge does. Not thread-safe: it belongs to the pipeline."""
+    """Measures wheels and joints; the bridge uses the results. Not thread-safe: it belongs to the pipeline."""
 
     def __init__(self, model: RobotModel, clock: Callable[[], float] = time.time) -> None:
         """Start without pictures.
@@ -28,13 +51,15 @@ class RobotCalibrator:
             clock: Time of the day (s since 1970).
         """
         self._model, self._clock = model, clock
-        self._views: dict[str, BaseView] = {}
-        self._used: WheelSizes | None = None
+        self._base: _Round[BaseView] = _Round(BASE)
+        self._arm: _Round[BoardView] = _Round(ARM)
         self.state = RobotCalibration(header=m.Header(0.0, "camera"))
         """What is known, for people and the controller."""
+        self.mount: CameraMount | None = None
+        """The camera by the same pictures as the arm that is offered; None without one."""
 
     def look(self, frame: CameraFrame) -> CloseUpResult:
-        """Take in a picture of the board between two drives.
+        """Take in a picture of the board between two drives, or from a posture of the arm.
 
         Args:
             frame: As received. The first one of a calibration is number 1 in its `point_id`.
@@ -43,40 +68,40 @@ class RobotCalibrator:
             CorruptFrameError: The frame is corrupt; nothing changes.
         """
         view = decode_frame(frame, self._model)
-        used = self._model.drive.sizes if frame.wheels is None else WheelSizes(*frame.wheels)
-        if frame.point_id == f"{BASE}1" or used != self._used:
-            self._views, self._used = {}, used
-        at_origin = configuration(m.PlanarPose(0.0, 0.0, 0.0), frame.position)
-        T_base_camera = self._model.pose(at_origin, self._model.camera_id)
-        place = np.array([frame.base.x, frame.base.y, frame.base.phi])
-        found = find_board(view, view.intrinsics, None, place)
-        if found is not None:
-            # The frame has angles of wheels as drawn; those of the real ones follow from the sizes in use.
-            drawn = self._model.drive.sizes.motion() @ np.array(frame.position[:2])
-            wheels = np.linalg.solve(used.motion(), drawn)
-            self._views[frame.point_id] = BaseView(found, T_base_camera, wheels, view.stamp)
-        self._solve(used, view.stamp)
+        seen = self._look_from_arm(frame, view) if frame.point_id.startswith(ARM) else self._look_from_base(frame, view)
         return CloseUpResult(
             header=m.Header(frame.header.stamp, "odom"),
             point_id=frame.point_id,
             number=frame.number,
-            finding="unseen" if found is None else "seen",
-            reason=reasons.board_not_in_picture() if found is None else None,
+            finding="seen" if seen else "unseen",
+            reason=None if seen else reasons.board_not_in_picture(),
         )
 
-    def _solve(self, used: WheelSizes, stamp: float) -> None:
-        """The offer by all pictures so far, or why there is none."""
-        found: m.BaseCalibration | None = None
-        refused: m.Reason | None = None
+    def _look_from_base(self, frame: CameraFrame, view: View) -> bool:
+        used = self._model.drive.sizes if frame.wheels is None else WheelSizes(*frame.wheels)
+        at_origin = configuration(m.PlanarPose(0.0, 0.0, 0.0), frame.position)
+        T_base_camera = self._model.pose(at_origin, self._model.camera_id)
+        board = find_board(view, view.intrinsics, None, configuration(frame.base, frame.position))
+        # The frame has angles of wheels as drawn; those of the real ones follow from the sizes in use.
+        drawn = self._model.drive.sizes.motion() @ np.array(frame.position[:2])
+        wheels = np.linalg.solve(used.motion(), drawn)
+        seen = None if board is None else BaseView(board, T_base_camera, wheels, view.stamp)
+        views = self._base.add(frame.point_id, used, seen)
+        found, refused = None, None
         try:
-            found = self._offer(measure_wheels(tuple(self._views.values()), used, self._model.drive.sizes))
+            found = self._base_offer(measure_wheels(views, used, self._model.drive.sizes))
         except CalibrationError as error:
             refused = error.reason
-        self.state = RobotCalibration(
-            header=m.Header(stamp, "camera"), base_views=len(self._views), base=found, base_refused=refused
+        self.state = replace(
+            self.state,
+            header=m.Header(view.stamp, "camera"),
+            base_views=len(views),
+            base=found,
+            base_refused=refused,
         )
+        return seen is not None
 
-    def _offer(self, fit: BaseFit) -> m.BaseCalibration:
+    def _base_offer(self, fit: BaseFit) -> m.BaseCalibration:
         return m.BaseCalibration(
             left=fit.sizes.left,
             right=fit.sizes.right,
@@ -88,3 +113,35 @@ class RobotCalibrator:
             track_sd=fit.track_sd,
             slip=fit.slip,
         )
+
+    def _look_from_arm(self, frame: CameraFrame, view: View) -> bool:
+        q = configuration(frame.base, frame.position)
+        seen = find_board(view, frame.intrinsics, self._model.pose(q, self._model.flange_id), q)
+        views = self._arm.add(frame.point_id, frame.joint_offsets, seen)
+        found, refused, self.mount = None, None, None
+        try:
+            found, self.mount = self._arm_offer(views, frame.joint_offsets)
+        except CalibrationError as error:
+            refused = error.reason
+        self.state = replace(
+            self.state, header=m.Header(view.stamp, "camera"), arm_views=len(views), arm=found, arm_refused=refused
+        )
+        return seen is not None
+
+    def _arm_offer(self, views: tuple[BoardView, ...], used: JointOffsets) -> tuple[ArmCalibration, CameraMount]:
+        """The joints' offsets, and the camera that belongs to them."""
+        fit, made_at = calibrate(views, self._model), self._clock()
+        # The angles of the frames are less the offsets in use.
+        offsets = np.array(used) + fit.offsets
+        worst = int(np.abs(offsets).argmax())
+        if abs(offsets[worst]) > LARGEST_OFFSET:
+            off = float(np.degrees(offsets[worst]))
+            raise CalibrationError(reasons.arm_far(worst + 1, off, float(np.degrees(LARGEST_OFFSET))))
+        arm = ArmCalibration(
+            offsets=joint_offsets(offsets),
+            made_at=made_at,
+            views=fit.views,
+            pixels=fit.pixels,
+            offset_sd=fit.offset_sd,
+        )
+        return arm, mount_of(fit, self._model, made_at, arm.offsets)

@@ -1,6 +1,7 @@
-"""The files that keep the calibrations, in the robot's state folder: `camera.toml` and `base.toml`."""
+"""The files that keep the calibrations, in the robot's state folder: `camera.toml`, `base.toml` and `arm.toml`."""
 
 import tomllib
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -9,12 +10,12 @@ import numpy as np
 
 from rolling_panda.errors import ConfigError
 from rolling_panda.messages.perception import CameraMount
-from rolling_panda.messages.robot import BaseCalibration
+from rolling_panda.messages.robot import AnyCalibration, ArmCalibration, BaseCalibration
 from rolling_panda.model.differential_drive import WheelSizes
 from rolling_panda.model.robot import RobotModel, mount_pose, turn_and_shift
 from rolling_panda.runtime.state_folder import replace_durably
 
-FILE, BASE_FILE = "camera.toml", "base.toml"
+FILE, BASE_FILE, ARM_FILE = "camera.toml", "base.toml", "arm.toml"
 #: A calibration that places the camera farther from the drawing than this (rad, m) is of another camera or bracket.
 FARTHEST_TURN, FARTHEST_SHIFT = 0.15, 0.05
 #: A calibration is old from this age on (s): work shakes brackets loose.
@@ -23,10 +24,20 @@ OLD_S = 90 * 86400.0
 FARTHEST_WHEELS, FARTHEST_APART = 0.05, 0.02
 _HEAD = "# Where the camera is on the arm's flange. Without this file, perception takes it to be where it is drawn."
 _BASE_HEAD = "# Sizes of the base's wheels (m). Without this file, the bridge takes them to be as drawn."
+_ARM_HEAD = "# Offsets of the arm's encoders (rad). Without this file, the bridge takes them to be zero."
 _REMEDY = "calibrate the camera again, or remove the file"
 _BASE_REMEDY = "calibrate the base again, or remove the file"
+_ARM_REMEDY = "calibrate the arm again, or remove the file"
 
 Kept = TypeVar("Kept")
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """Calibrations of the robot itself, as the bridge uses them; None takes the part to be as drawn."""
+
+    base: BaseCalibration | None = None
+    arm: ArmCalibration | None = None
 
 
 def load(folder: Path, robot_id: str, drawn: RobotModel) -> CameraMount | None:
@@ -62,8 +73,8 @@ def save(folder: Path, robot_id: str, mount: CameraMount) -> None:
     _write(folder / FILE, robot_id, mount, _HEAD)
 
 
-def load_base(folder: Path, robot_id: str, drawn: WheelSizes) -> BaseCalibration | None:
-    """The calibration of a robot's wheels; None where none was made.
+def load_robot(folder: Path, robot_id: str, drawn: WheelSizes) -> Calibrated:
+    """The calibrations of a robot's wheels and joints.
 
     Args:
         folder: State folder of the robot.
@@ -71,7 +82,7 @@ def load_base(folder: Path, robot_id: str, drawn: WheelSizes) -> BaseCalibration
         drawn: The wheels as drawn.
 
     Raises:
-        ConfigError: The file cannot be read, is of another robot, or its values are out of range.
+        ConfigError: A file cannot be read, is of another robot, or its values are out of range.
     """
     path = folder / BASE_FILE
     base = _read(path, robot_id, BaseCalibration, "a base", _BASE_REMEDY)
@@ -80,16 +91,18 @@ def load_base(folder: Path, robot_id: str, drawn: WheelSizes) -> BaseCalibration
             f"{path} has wheels that differ from those drawn by more than {100 * FARTHEST_WHEELS:.0f} %, or from each "
             f"other by more than {100 * FARTHEST_APART:.0f} %; {_BASE_REMEDY}"
         )
-    return base
+    return Calibrated(base, _read(folder / ARM_FILE, robot_id, ArmCalibration, "an arm", _ARM_REMEDY))
 
 
-def save_base(folder: Path, robot_id: str, base: BaseCalibration) -> None:
-    """Replace the calibration of a robot's wheels; an interruption leaves the old one or the new.
+def save_robot(folder: Path, robot_id: str, calibration: AnyCalibration) -> None:
+    """Replace one of the robot's calibrations; an interruption leaves the old one or the new.
 
     Raises:
         OSError: The file is not on disk.
     """
-    _write(folder / BASE_FILE, robot_id, base, _BASE_HEAD)
+    arm = isinstance(calibration, ArmCalibration)
+    path, head = (ARM_FILE, _ARM_HEAD) if arm else (BASE_FILE, _BASE_HEAD)
+    _write(folder / path, robot_id, calibration, head)
 
 
 def plausible(base: BaseCalibration, drawn: WheelSizes) -> bool:

@@ -1,4 +1,4 @@
-"""`rolling-panda calibrate`: the board to print, and the calibrations of camera and base by it.
+"""`rolling-panda calibrate`: the board to print, and the calibrations of camera, base and arm by it.
 
 The robot is moved by the running program with all of its checks, as by a press of a button on the page. This command
 asks for it as a script does, watches, and shows the result.
@@ -19,6 +19,13 @@ from rolling_panda.errors import InputError, ServiceError
 #: state to show that it is in use (s).
 _POLL_S, _BEGUN_S, _LIMIT_S, _USED_S = 0.3, 3.0, 600.0, 5.0
 _DPI, _SQUARE_PX = 600, 240
+_BASE_QUESTION = (
+    "Is the board 45 cm before the camera in its survey posture, the ground firm, and half a metre free before and "
+    "behind the base? It will drive and turn."
+)
+_ARM_QUESTION = (
+    "Is the board 45 cm before the camera in its survey posture, and nobody near the arm? It will move, with its elbow."
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,7 +35,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     board.add_argument("--out", type=Path, default=Path("board.png"), help="file (default: %(default)s)")
     camera = kinds.add_parser("camera", help="look at the board from all around, and place the camera on the arm by it")
     base = kinds.add_parser("base", help="drive and turn before the board, and measure the wheels by it")
-    for kind in (camera, base):
+    arm = kinds.add_parser(
+        "arm", help="look at the board with many postures of the arm, and measure the zeros of its joints by it"
+    )
+    for kind in (camera, base, arm):
         kind.add_argument(
             "page",
             help="a sign-in link of the page, which Invite makes and the demo prints; with --user its address alone",
@@ -46,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
     """
     if arguments.kind == "board":
         return _write_board(arguments.out)
-    return _calibrate_camera(arguments) if arguments.kind == "camera" else _calibrate_base(arguments)
+    return _calibrate_camera(arguments) if arguments.kind == "camera" else _calibrate_part(arguments, arguments.kind)
 
 
 def _write_board(out: Path) -> int:
@@ -81,26 +91,40 @@ def _calibrate_camera(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _calibrate_base(arguments: argparse.Namespace) -> int:
+def _calibrate_part(arguments: argparse.Namespace, part: str) -> int:
+    """Base or arm, whose calibration the bridge uses."""
+    told, question = (_wheels_told, _BASE_QUESTION) if part == "base" else (_joints_told, _ARM_QUESTION)
     with _Page(arguments.page, arguments.user) as page:
-        used = page.get("state")["bridge"]
-        print(f"In use: {_wheels_told(None if used is None else used['base'])}")
-        question = (
-            "Is the board 45 cm before the camera in its survey posture, the ground firm, and half a metre free before "
-            "and behind the base? It will drive and turn."
+        print(f"In use: {told((page.get('state')['bridge'] or {}).get(part))}")
+        offer = _measured(
+            page, arguments.yes, question, part, ("calibration", f"{part}_views", part, f"{part}_refused")
         )
-        names = "calibration", "base_views", "base", "base_refused"
-        offer = _measured(page, arguments.yes, question, "base", names)
         if offer is None:
             return 1
-        print(f"New:    {_wheels_told(offer)}")
-        if not arguments.yes and not _agreed("Use it?"):
+        print(f"New:    {told(offer)}")
+        also = " The camera's place by the same pictures too: all points are then looked for anew." * (part == "arm")
+        if not arguments.yes and not _agreed(f"Use it?{also}"):
             return 1
-        page.post("base/use", {"made_at": offer["made_at"]})
-        if not page.waits_for(lambda: (page.get("state")["bridge"] or {}).get("base") == offer):
+        page.post(f"{part}/use", {"made_at": offer["made_at"]})
+        if not page.waits_for(lambda: (page.get("state")["bridge"] or {}).get(part) == offer):
             print(f"It is not in use: {page.newest_event()}")
             return 1
         print("It is in use.")
+        return _use_its_camera(page, offer) if part == "arm" else 0
+
+
+def _use_its_camera(page: "_Page", arm: dict[str, Any]) -> int:
+    """Use the camera that was measured together with the arm, once perception sees the arm's new angles."""
+
+    def mount() -> dict[str, Any] | None:
+        offer: dict[str, Any] | None = page.get("camera")["offer"]
+        return offer if offer is not None and offer["joint_offsets"] == arm["offsets"] else None
+
+    if not page.waits_for(lambda: mount() is not None) or (found := mount()) is None:
+        print("The camera's calibration does not fit the arm any more: calibrate the camera.")
+        return 1
+    print(f"Camera: {_told(found)}")
+    print(page.post("camera/use", {"made_at": found["made_at"]}))
     return 0
 
 
@@ -113,7 +137,7 @@ def _measured(
         page: Session with the server.
         yes: Whether nothing is asked.
         question: Asked before anything moves.
-        what: Calibrated part: `camera` or `base`.
+        what: Calibrated part: `camera`, `base` or `arm`.
         names: Path of the state, and in it the number of views, the offer and why there is none.
     """
     path, views, offered, refused = names
@@ -141,6 +165,17 @@ def _wheels_told(base: dict[str, Any] | None) -> str:
         f"{made}, {base['views']} views: radius {1e3 * base['left']:.2f} and {1e3 * base['right']:.2f} mm, track "
         f"{1e3 * base['track']:.2f} mm; standard deviation {100 * base['radius_sd']:.2f} % and "
         f"{100 * base['track_sd']:.2f} %; slip {100 * base['slip']:.2f} %"
+    )
+
+
+def _joints_told(arm: dict[str, Any] | None) -> str:
+    if arm is None:
+        return "the zeros of the arm's joints are taken to be as drawn"
+    made = time.strftime("%Y-%m-%d %H:%M", time.localtime(arm["made_at"]))
+    offsets = ", ".join(f"{math.degrees(offset):.3f}" for offset in arm["offsets"][1:6])
+    return (
+        f"{made}, {arm['views']} views: joints 2 to 6 off by {offsets} degrees; standard deviation "
+        f"{math.degrees(arm['offset_sd']):.3f} degrees; error {arm['pixels']:.2f} px"
     )
 
 

@@ -61,8 +61,9 @@ _OWN: dict[str, tuple[Any, str, str]] = {
     ),
     "calibrate": (
         calibrate,
-        "where the camera is on the arm, how large the wheels are: print the board, look at it from all around",
-        "Print the board of the calibration, or let the running robot look at it and measure its camera or its wheels.",
+        "camera on the arm, size of the wheels, zeros of the joints: print the board, look at it from all around",
+        "Print the board of the calibration, or let the running robot look at it and measure its camera, its wheels "
+        "or the zeros of its joints.",
     ),
     "status": (
         status,

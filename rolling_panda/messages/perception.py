@@ -6,7 +6,7 @@ from typing import Annotated, Final, Literal
 import msgspec
 from msgspec import Meta, Struct
 
-from rolling_panda.messages.robot import BaseCalibration
+from rolling_panda.messages.robot import NO_OFFSETS, ArmCalibration, BaseCalibration, JointOffsets
 from rolling_panda.messages.types import (
     Count,
     Covariance,
@@ -318,6 +318,8 @@ CALIBRATION: Final = "calibration:"
 CHECK: Final = "check:"
 #: The same of a picture of the board between the drives of the base's calibration.
 BASE: Final = "base:"
+#: The same of a picture of the board for the calibration of the arm's joints.
+ARM: Final = "arm:"
 
 
 class CameraMount(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -333,6 +335,7 @@ class CameraMount(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
         pixels: Root mean square of the reprojection error (px); 0 for `work`.
         angle_sd: Standard deviation of the direction in which it looks (rad).
         shift_sd: Standard deviation of the position along each axis (m).
+        joint_offsets: Offsets of the arm's joints that it was made with (rad); with others it does not fit.
     """
 
     position: Vector3
@@ -344,6 +347,7 @@ class CameraMount(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     pixels: NonNegative = 0.0
     angle_sd: NonNegative = 0.0
     shift_sd: NonNegative = 0.0
+    joint_offsets: JointOffsets = NO_OFFSETS
 
 
 class CameraState(Message, frozen=True, kw_only=True):
@@ -381,12 +385,18 @@ class RobotCalibration(Message, frozen=True, kw_only=True):
         base_views: Pictures of the board since the last calibration of the base began.
         base: A new calibration of the base, which `UseBase` takes; None without one.
         base_refused: Why the last calibration of the base gave none; None if it gave one, or before the first.
+        arm_views: Pictures of the board since the last calibration of the arm began.
+        arm: A new calibration of the arm, which `UseArm` takes; None without one.
+        arm_refused: Why the last calibration of the arm gave none; None if it gave one, or before the first.
     """
 
     header: Header
     base_views: Count = 0
     base: BaseCalibration | None = None
     base_refused: Reason | None = None
+    arm_views: Count = 0
+    arm: ArmCalibration | None = None
+    arm_refused: Reason | None = None
 
 
 class Scenery(Message, frozen=True, kw_only=True):

@@ -1,7 +1,7 @@
 """Messages to and from the robot: motion, cuts, stops, joints, odometry, camera frames."""
 
 import hashlib
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 from msgspec import Meta, Struct
 
@@ -189,16 +189,48 @@ class BaseCalibration(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     slip: NonNegative = 0.0
 
 
+#: The most by which the encoder of a joint may be off (rad): 2°.
+LARGEST_OFFSET: Final = 0.035
+Offset = Annotated[float, Meta(ge=-LARGEST_OFFSET, le=LARGEST_OFFSET)]
+JointOffsets = tuple[Offset, Offset, Offset, Offset, Offset, Offset, Offset]
+NO_OFFSETS: Final[JointOffsets] = (0.0,) * 7
+
+
+class ArmCalibration(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Calibration of the zeros of the arm's joints.
+
+    Attributes:
+        offsets: Angle of each joint by its encoder less its angle as drawn (rad). Those of joints 1 and 7 are 0: the
+            pictures cannot tell them from the place of the board, and of the camera.
+        made_at: Time of the calibration.
+        views: Number of pictures of the board.
+        pixels: Root mean square of the reprojection error (px).
+        offset_sd: Standard deviation of the most uncertain of the measured offsets (rad).
+    """
+
+    offsets: JointOffsets
+    made_at: WallTime = 0.0
+    views: Count = 0
+    pixels: NonNegative = 0.0
+    offset_sd: NonNegative = 0.0
+
+
+#: A calibration of the robot itself, which the bridge uses.
+AnyCalibration = BaseCalibration | ArmCalibration
+
+
 class UseCalibration(Message, frozen=True, kw_only=True):
     """Controller → bridge: use a calibration from now on, and after a restart. It moves nothing.
 
     Attributes:
         user: Who wants it.
-        base: Of the base.
+        base: Of the base; None if it is of the arm.
+        arm: Of the arm; None if it is of the base.
     """
 
     user: Text
-    base: BaseCalibration
+    base: BaseCalibration | None = None
+    arm: ArmCalibration | None = None
 
 
 class BridgeState(Message, frozen=True, kw_only=True):
@@ -226,6 +258,7 @@ class BridgeState(Message, frozen=True, kw_only=True):
         arm_success: Fraction of the arm's last 100 commands that arrived in time; None if unknown, as in simulation.
         relaxed_limits: Safety limits that its configuration sets less strictly than usual, within their hard bounds.
         base: Calibration of the wheels in use; None while they are taken to be as drawn.
+        arm: Calibration of the joints' zeros in use; None while they are taken to be as drawn.
     """
 
     header: Header
@@ -248,6 +281,7 @@ class BridgeState(Message, frozen=True, kw_only=True):
     sequence: Count = 0
     moving: bool = False
     base: BaseCalibration | None = None
+    arm: ArmCalibration | None = None
 
 
 class ReleaseStop(Message, frozen=True, kw_only=True):
@@ -301,6 +335,7 @@ class CameraFrame(Message, frozen=True, kw_only=True):
         number: `number` of the close-up request.
         wheels: Sizes of the wheels by which `base` and the wheels' `position` were computed: left and right radius and
             track (m). None for those drawn.
+        joint_offsets: Offsets of the arm's joints that were taken from what its encoders told (rad).
     """
 
     header: Header
@@ -315,3 +350,4 @@ class CameraFrame(Message, frozen=True, kw_only=True):
     point_id: Annotated[str, Meta(max_length=64)] = ""
     number: Count = 0
     wheels: tuple[Radius, Radius, Track] | None = None
+    joint_offsets: JointOffsets = NO_OFFSETS

@@ -1,5 +1,6 @@
 """Arrays as the wire has them: tuples of plain numbers."""
 
+from rolling_panda.messages.robot import JointOffsets
 from rolling_panda.messages.types import Actuated, ArmTorques, PlanarPose, Vector3
 from rolling_panda.model.differential_drive import Array
 
@@ -18,6 +19,12 @@ def actuated(values: Array) -> Actuated:
 
 def arm_torques(values: Array) -> ArmTorques:
     """Torques of the arm's joints (7)."""
+    a, b, c, d, e, f, g = values.tolist()
+    return a, b, c, d, e, f, g
+
+
+def joint_offsets(values: Array) -> JointOffsets:
+    """Offsets of the arm's joints (7)."""
     a, b, c, d, e, f, g = values.tolist()
     return a, b, c, d, e, f, g
 

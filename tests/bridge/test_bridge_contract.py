@@ -17,6 +17,8 @@ from bridge.sim.robot.robot import SimulatedRobot
 from bridge.sim.vineyard.row import Row
 from rolling_panda import messages as m
 from rolling_panda.config import load_section
+from rolling_panda.model.differential_drive import Array
+from rolling_panda.model.robot import ARM_Q
 from rolling_panda.reasons import said
 from rolling_panda.resources import resource
 from tests.support.bridge_rig import FORWARD, MODEL, REST, NoCamera, Parts, Rig, SimulatedPlant
@@ -107,6 +109,35 @@ def test_calibrated_wheels_turn_as_the_ground_needs_and_the_odometry_tells_the_w
 
     assert rig.until(followed, FORWARD)
     assert rig.plant.breaches() == []
+
+
+def test_calibrated_joints_are_told_as_drawn_and_end_at_their_own_limits(rig: Rig) -> None:
+    rig.run(0.3, REST)
+    before = arm(rig)
+    off = 0.03
+    new = m.ArmCalibration(offsets=(0.0, 0.0, 0.0, off, 0.0, -off, 0.0), made_at=5.0)
+    rig.drive_on()
+    assert not rig.core.on_calibration(m.UseCalibration(user="ada", arm=new)).ok, "in motion"
+    rig.run(0.8, REST)
+    assert rig.until(rig.at_rest, REST)
+    own = arm(rig)
+    assert rig.core.on_calibration(m.UseCalibration(user="ada", arm=new)).ok
+    assert rig.until(lambda: rig.state.arm == new, REST)
+    rig.run(0.3, REST)
+    assert arm(rig) == pytest.approx(own - np.array(new.offsets), abs=2e-3) and rig.at_rest()
+    # Joints 4 and 6 to their upper limits: 4 is told below its own angle, 6 above it.
+    rig.run(6.0, (0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0))
+    there = arm(rig) + np.array(new.offsets)
+    highest = MODEL.limits.upper[ARM_Q]
+    assert np.abs(there - before).max() > 1.0, "it moved"
+    for joint in (3, 5):
+        assert highest[joint] - 0.03 < there[joint] < highest[joint], joint
+    assert rig.plant.breaches() == []
+
+
+def arm(rig: Rig) -> Array:
+    joints = next(out.joints for out in reversed(rig.outputs) if out.joints)
+    return np.array(joints.position[2:])
 
 
 def felt(rig: Rig) -> tuple[float, ...] | None:

@@ -6,10 +6,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rolling_panda.calibration.file import BASE_FILE, FILE, load, load_base, save, save_base
+from rolling_panda.calibration.file import ARM_FILE, BASE_FILE, FILE, Calibrated, load, load_robot, save, save_robot
 from rolling_panda.errors import ConfigError
 from rolling_panda.messages.perception import CameraMount
-from rolling_panda.messages.robot import BaseCalibration, Intrinsics
+from rolling_panda.messages.robot import ArmCalibration, BaseCalibration, Intrinsics
 from rolling_panda.model.robot import RobotModel, mount_pose, pose_message
 
 MODEL = RobotModel()
@@ -76,10 +76,10 @@ def base(**changes):
 
 
 def test_measured_wheels_are_read_at_the_next_start(tmp_path):
-    assert load_base(tmp_path, "rp1", DRAWN) is None
-    save_base(tmp_path, "rp1", base(views=3))
-    save_base(tmp_path, "rp1", base())
-    assert load_base(tmp_path, "rp1", DRAWN) == base()
+    assert load_robot(tmp_path, "rp1", DRAWN) == Calibrated()
+    save_robot(tmp_path, "rp1", base(views=3))
+    save_robot(tmp_path, "rp1", base())
+    assert load_robot(tmp_path, "rp1", DRAWN) == Calibrated(base=base())
     assert load(tmp_path, "rp1", MODEL) is None, "a file of its own"
 
 
@@ -94,19 +94,48 @@ def test_measured_wheels_are_read_at_the_next_start(tmp_path):
     ],
 )
 def test_a_file_of_other_wheels_is_refused_with_what_to_do(tmp_path, spoil, says):
-    save_base(tmp_path, "rp1", base())
+    save_robot(tmp_path, "rp1", base())
     path = tmp_path / BASE_FILE
     path.write_text(spoil(path.read_text()))
     with pytest.raises(ConfigError) as refused:
-        load_base(tmp_path, "rp1", DRAWN)
+        load_robot(tmp_path, "rp1", DRAWN)
     assert says in str(refused.value) and "calibrate the base again" in str(refused.value), refused.value
 
 
 def test_wheels_far_from_those_drawn_or_from_each_other_are_refused(tmp_path):
     for far in ({"left": 0.1275, "right": 0.1275}, {"track": 0.4801}, {"left": DRAWN.left * 1.02}):
-        save_base(tmp_path, "rp1", base(**far))
+        save_robot(tmp_path, "rp1", base(**far))
         if far.get("left") == 0.1275:
-            assert load_base(tmp_path, "rp1", DRAWN) is not None
+            assert load_robot(tmp_path, "rp1", DRAWN).base is not None
             continue
         with pytest.raises(ConfigError, match="differ from those drawn"):
-            load_base(tmp_path, "rp1", DRAWN)
+            load_robot(tmp_path, "rp1", DRAWN)
+
+
+ARM = ArmCalibration(offsets=(0.0, 0.01, -0.02, 0.03, 0.0, -0.005, 0.0), made_at=1.8e9, views=25, pixels=0.1)
+
+
+def test_the_joints_zeros_are_read_at_the_next_start_beside_the_wheels(tmp_path):
+    save_robot(tmp_path, "rp1", base())
+    save_robot(tmp_path, "rp1", ARM)
+    assert load_robot(tmp_path, "rp1", DRAWN) == Calibrated(base(), ARM)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "says"),
+    [
+        (lambda text: text.replace('"rp1"', '"rp2"'), "'rp2'"),
+        (lambda text: text.replace("0.03", "0.036"), "offsets"),
+        (lambda text: text.replace("0.03", "nan"), "offsets"),
+        (lambda text: text.replace("[0.0,", "["), "offsets"),
+        (lambda text: text.replace("views", "wiews"), "wiews"),
+        (lambda text: "", "offsets"),
+    ],
+)
+def test_a_file_of_another_arm_is_refused_with_what_to_do(tmp_path, spoil, says):
+    save_robot(tmp_path, "rp1", ARM)
+    path = tmp_path / ARM_FILE
+    path.write_text(spoil(path.read_text()))
+    with pytest.raises(ConfigError) as refused:
+        load_robot(tmp_path, "rp1", DRAWN)
+    assert says in str(refused.value) and "calibrate the arm again" in str(refused.value), refused.value

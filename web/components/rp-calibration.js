@@ -1,4 +1,4 @@
-// Calibration of camera and base: what is in use, how well ordinary work agrees with it, and a new one where there is one.
+// Calibration of camera, base and arm: what is in use, how well ordinary work agrees with it, and a new one where there is one.
 
 import { whyNot } from "../js/control/allowed.js";
 import { take } from "../js/control/commands.js";
@@ -11,16 +11,22 @@ import { drawOn, signal } from "../js/state/signals.js";
 import { counted, text } from "../js/state/texts.js";
 import { element, setEnabled, setText } from "../js/views/dom.js";
 
+/** @typedef {import("../js/link/messages.js").ArmCalibration} ArmCalibration */
 /** @typedef {import("../js/link/messages.js").BaseCalibration} BaseCalibration */
 /** @typedef {import("../js/link/messages.js").CameraMount} CameraMount */
 /** @typedef {import("../js/link/messages.js").CameraState} CameraState */
 /** @typedef {import("../js/link/messages.js").RobotCalibration} RobotCalibration */
-/** @typedef {"CheckCamera"|"CalibrateCamera"|"UseCamera"|"CalibrateBase"|"UseBase"} Command */
+/** @typedef {"CheckCamera"|"CalibrateCamera"|"UseCamera"|"CalibrateBase"|"UseBase"|"CalibrateArm"|"UseArm"} Command */
 
 /** Period of the calibrations' state while the screen is open (ms). */
 const AGAIN_MS = 2000;
 const DEGREE = Math.PI / 180;
-const ROWS = /** @type {const} */ (["used", "seen", "offer", "base", "base_offer"]);
+const ROWS = /** @type {const} */ (["used", "seen", "offer", "base", "base_offer", "arm", "arm_offer"]);
+/** Parts of the robot that the bridge uses a calibration of. */
+const PARTS = /** @type {const} */ ([
+  { part: "base", calibrate: "CalibrateBase", use: "UseBase", none: "no_base_offered" },
+  { part: "arm", calibrate: "CalibrateArm", use: "UseArm", none: "no_arm_offered" },
+]);
 
 class RpCalibration extends HTMLElement {
   camera = signal(/** @type {CameraState|null} */ (null));
@@ -35,12 +41,20 @@ class RpCalibration extends HTMLElement {
     const check = button("check-camera", "CheckCamera", () => void ask(text("command.CheckCamera"), "api/camera/check"));
     const calibrate = button("calibrate-camera", "CalibrateCamera", () => void ask(text("command.CalibrateCamera"), "api/camera/calibrate"));
     const use = button("use-camera", "UseCamera", () => void take("calibration"));
-    const measure = button("calibrate-base", "CalibrateBase", () => void ask(text("command.CalibrateBase"), "api/base/calibrate"));
-    const useBase = button("use-base", "UseBase", () => {
-      const base = this.robot.get()?.base;
-      if (base) void ask(text("command.UseBase"), "api/base/use", { made_at: base.made_at });
+    const parts = PARTS.map(({ part, calibrate, use, none }) => {
+      const path = (/** @type {string} */ what) => `api/${part}/${what}`;
+      const measure = button(`calibrate-${part}`, calibrate, () => void ask(text(`command.${calibrate}`), path("calibrate")));
+      const useIt = button(`use-${part}`, use, () => {
+        const offer = this.robot.get()?.[part];
+        if (offer) void ask(text(`command.${use}`), path("use"), { made_at: offer.made_at });
+      });
+      const draw = () => {
+        setEnabled(measure, whyNot(calibrate), text(`calibration.${part}_hint`));
+        setEnabled(useIt, whyNot(use) ?? (newPart(part, this.robot.get()) ? null : reason(none)), text(`calibration.${part}_use_hint`));
+      };
+      return { buttons: [measure, useIt], draw };
     });
-    this.append(list, element("div", { class: "buttons" }, check, calibrate, use, measure, useBase));
+    this.append(list, element("div", { class: "buttons" }, check, calibrate, use, ...parts.flatMap(({ buttons }) => buttons)));
     whileOpen("engineer", AGAIN_MS, async () => {
       this.camera.set((await fetchJson("api/camera")) ?? this.camera.get());
       this.robot.set((await fetchJson("api/calibration")) ?? this.robot.get());
@@ -48,13 +62,12 @@ class RpCalibration extends HTMLElement {
     drawOn([this.camera, this.robot, pageState, link, now], () => {
       if (screen.get() !== "engineer") return;
       const [camera, robot] = [this.camera.get(), this.robot.get()];
-      const words = { ...cameraWords(camera), base: baseWords(pageState.get()?.bridge?.base), base_offer: robot ? offerWords(robot) : text("calibration.untold") };
+      const words = { ...cameraWords(camera), ...partWords("base", robot), ...partWords("arm", robot) };
       for (const { row, cell } of cells) setText(cell, words[row]);
       setEnabled(check, whyNot("CheckCamera"), text("calibration.check_hint"));
       setEnabled(calibrate, whyNot("CalibrateCamera"), text("calibration.calibrate_hint"));
       setEnabled(use, whyNot("UseCamera") ?? (camera?.offer ? null : reason("no_calibration_offered")), text("calibration.use_hint"));
-      setEnabled(measure, whyNot("CalibrateBase"), text("calibration.base_hint"));
-      setEnabled(useBase, whyNot("UseBase") ?? (isNew(robot?.base) ? null : reason("no_base_offered")), text("calibration.base_use_hint"));
+      for (const { draw } of parts) draw();
     });
   }
 }
@@ -89,30 +102,37 @@ function madeWords({ source, made_at, views, pixels, angle_sd, shift_sd }) {
   return counted("calibration.work", views, { date, sd, shift });
 }
 
-/** Whether a calibration of the base is another one than that in use. @param {BaseCalibration|null|undefined} base */
-function isNew(base) {
-  return base != null && base.made_at !== pageState.get()?.bridge?.base?.made_at;
+/** The new calibration of a part; null without one, and for the one in use. @param {"base"|"arm"} part @param {RobotCalibration|null} robot */
+function newPart(part, robot) {
+  const offer = robot?.[part];
+  return offer && offer.made_at !== pageState.get()?.bridge?.[part]?.made_at ? offer : null;
 }
 
-/** @param {RobotCalibration} robot */
-function offerWords({ base, base_refused, base_views }) {
-  if (base && isNew(base)) return baseWords(base);
-  if (base_refused && base_views > 0) return reasonText(base_refused);
-  return text("calibration.none");
+/** What is in use for a part, and what is new. @template {"base"|"arm"} Part @param {Part} part @param {RobotCalibration|null} robot */
+function partWords(part, robot) {
+  const used = pageState.get()?.bridge?.[part];
+  const [offer, refused] = [newPart(part, robot), robot?.[`${part}_refused`]];
+  const found = offer ? measuredWords(offer) : refused && robot?.[`${part}_views`] ? reasonText(refused) : text("calibration.none");
+  const words = { [part]: used ? measuredWords(used) : text(`calibration.${part}_drawn`), [`${part}_offer`]: robot ? found : text("calibration.untold") };
+  return /** @type {Record<Part|`${Part}_offer`, string>} */ (words);
 }
 
-/** @param {BaseCalibration|null|undefined} base */
-function baseWords(base) {
-  if (!base) return text("calibration.base_drawn");
+/** @param {BaseCalibration|ArmCalibration} made */
+function measuredWords(made) {
+  const date = dateWords(made.made_at);
+  if ("offsets" in made) {
+    const offsets = made.offsets.slice(1, 6).map(turn).join(", ");
+    return counted("calibration.arm_measured", made.views, { date, offsets, sd: turn(made.offset_sd), pixels: decimal(made.pixels, 2) });
+  }
   const mm = (/** @type {number} */ length) => decimal(length * 1000, 2);
   const percent = (/** @type {number} */ share) => decimal(share * 100, 2);
-  return counted("calibration.base_measured", base.views, {
-    date: dateWords(base.made_at),
-    left: mm(base.left),
-    right: mm(base.right),
-    track: mm(base.track),
-    radius_sd: percent(base.radius_sd),
-    track_sd: percent(base.track_sd),
+  return counted("calibration.base_measured", made.views, {
+    date,
+    left: mm(made.left),
+    right: mm(made.right),
+    track: mm(made.track),
+    radius_sd: percent(made.radius_sd),
+    track_sd: percent(made.track_sd),
   });
 }
 

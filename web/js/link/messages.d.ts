@@ -15,6 +15,8 @@ export const POINT_STATES: {
 export const TEXT_MAX_LENGTH: number;
 export const SURE: number;
 
+export type JointOffsets = [number, number, number, number, number, number, number];
+
 export type Covariance = [number, number, number, number, number, number];
 
 export type CutKind = "spur cut"|"renewal cut"|"cane cut"|"by hand";
@@ -292,6 +294,20 @@ export interface BaseCalibration {
   slip: number;
 }
 
+/** Calibration of the zeros of the arm's joints. */
+export interface ArmCalibration {
+  /** Angle of each joint by its encoder less its angle as drawn (rad). Those of joints 1 and 7 are 0: the pictures cannot tell them from the place of the board, and of the camera. */
+  offsets: JointOffsets;
+  /** Time of the calibration. */
+  made_at: number;
+  /** Number of pictures of the board. */
+  views: number;
+  /** Root mean square of the reprojection error (px). */
+  pixels: number;
+  /** Standard deviation of the most uncertain of the measured offsets (rad). */
+  offset_sd: number;
+}
+
 /** Bridge → all: stop latch, watchdog and cutter of the bridge. The controller can override none of them. */
 export interface BridgeState {
   type: "BridgeState";
@@ -335,6 +351,8 @@ export interface BridgeState {
   moving: boolean;
   /** Calibration of the wheels in use; None while they are taken to be as drawn. */
   base: BaseCalibration|null;
+  /** Calibration of the joints' zeros in use; None while they are taken to be as drawn. */
+  arm: ArmCalibration|null;
 }
 
 /** Bridge → all: measured actuated coordinates, like sensor_msgs/JointState. */
@@ -900,6 +918,8 @@ export interface CameraMount {
   angle_sd: number;
   /** Standard deviation of the position along each axis (m). */
   shift_sd: number;
+  /** Offsets of the arm's joints that it was made with (rad); with others it does not fit. */
+  joint_offsets: JointOffsets;
 }
 
 /** Perception → server: the camera's calibration, and the monitor's estimate of its error. */
@@ -936,6 +956,12 @@ export interface RobotCalibration {
   base: BaseCalibration|null;
   /** Why the last calibration of the base gave none; None if it gave one, or before the first. */
   base_refused: Reason|null;
+  /** Pictures of the board since the last calibration of the arm began. */
+  arm_views: number;
+  /** A new calibration of the arm, which `UseArm` takes; None without one. */
+  arm: ArmCalibration|null;
+  /** Why the last calibration of the arm gave none; None if it gave one, or before the first. */
+  arm_refused: Reason|null;
 }
 
 /** A cut as it is drawn on a picture. */

@@ -1,4 +1,4 @@
-"""Calibrated wheels: odometry and commands agree with the ground, and nothing else in the bridge has to know."""
+"""Calibrated wheels and joints: what is told and commanded agrees with the world, and nothing else has to know."""
 
 from concurrent.futures import Future
 
@@ -8,7 +8,7 @@ from msgspec.structs import replace
 
 from bridge.config import BridgeConfig
 from bridge.core.bridge import TICK_S, BridgeCore
-from bridge.core.calibration import WheelCalibration
+from bridge.core.calibration import Calibration
 from bridge.core.interface import NO_CUT, Measurement
 from bridge.core.odometer import Odometer
 from bridge.core.robot_time import SteppedTime
@@ -17,13 +17,15 @@ from bridge.sim.vineyard.row import Row
 from bridge.sim.world.config import CALM
 from bridge.sim.world.errors import draw_errors
 from rolling_panda import messages as m
+from rolling_panda.calibration.file import Calibrated
 from rolling_panda.config import load_section
-from rolling_panda.messages.robot import BaseCalibration, UseCalibration
+from rolling_panda.messages.robot import NO_OFFSETS, ArmCalibration, BaseCalibration, UseCalibration
 from rolling_panda.resources import resource
 from tests.support.bridge_rig import MODEL, REST, NoCamera, Parts, Rig, SimulatedPlant
 
 DRAWN, FASTEST = MODEL.drive.sizes, float(MODEL.limits.velocity[0])
 WORN = BaseCalibration(left=DRAWN.left * 0.97, right=DRAWN.right * 0.98, track=DRAWN.track * 1.02, made_at=9.0)
+ARM = ArmCalibration(offsets=(0.0, 0.01, -0.02, 0.03, 0.0, -0.005, 0.0), made_at=8.0)
 
 
 def measurement(wheels, speeds=(0.0, 0.0)):
@@ -32,12 +34,12 @@ def measurement(wheels, speeds=(0.0, 0.0)):
 
 
 def test_without_a_calibration_everything_is_as_it_was():
-    wheels, xi, there = WheelCalibration(DRAWN, FASTEST), np.arange(9.0), measurement((3.0, 4.0))
+    wheels, xi, there = Calibration(DRAWN, FASTEST), np.arange(9.0), measurement((3.0, 4.0))
     assert wheels.measured(there) is there and wheels.commanded(xi) is xi and wheels.sizes is None
 
 
 def test_measured_wheels_tell_the_way_on_the_ground_and_commanded_ones_make_it():
-    wheels = WheelCalibration(DRAWN, FASTEST, WORN)
+    wheels = Calibration(DRAWN, FASTEST, Calibrated(base=WORN))
     wheels.measured(measurement((1.0, 1.0)))
     shown = wheels.measured(measurement((3.0, 4.0), (0.5, 0.7)))
     way, turn = 0.5 * (2.0 * WORN.left + 3.0 * WORN.right), (3.0 * WORN.right - 2.0 * WORN.left) / WORN.track
@@ -53,9 +55,11 @@ def test_measured_wheels_tell_the_way_on_the_ground_and_commanded_ones_make_it()
 
 
 def test_no_wheel_is_made_faster_than_its_limit_and_the_curve_stays():
-    wheels = WheelCalibration(DRAWN, FASTEST, WORN)
+    wheels = Calibration(DRAWN, FASTEST, Calibrated(base=WORN))
     left, right = wheels.commanded(np.array([FASTEST, 0.5 * FASTEST, *[0.0] * 7]))[:2]
-    free = WheelCalibration(DRAWN, 100.0, WORN).commanded(np.array([FASTEST, 0.5 * FASTEST, *[0.0] * 7]))[:2]
+    free = Calibration(DRAWN, 100.0, Calibrated(base=WORN)).commanded(np.array([FASTEST, 0.5 * FASTEST, *[0.0] * 7]))[
+        :2
+    ]
     assert free.max() > FASTEST and max(left, right) == pytest.approx(FASTEST)
     assert left / right == pytest.approx(free[0] / free[1])
 
@@ -63,7 +67,7 @@ def test_no_wheel_is_made_faster_than_its_limit_and_the_curve_stays():
 def test_a_new_calibration_is_used_once_it_is_kept_and_at_rest_and_the_wheels_go_on_where_they_were():
     disk: Future[None] = Future()
     kept = []
-    wheels = WheelCalibration(DRAWN, FASTEST, keep=lambda base: kept.append(base) or disk)
+    wheels = Calibration(DRAWN, FASTEST, keep=lambda base: kept.append(base) or disk)
     before = wheels.measured(measurement((50.0, 70.0))).position
     assert wheels.request(WORN) is None and kept == [WORN]
     assert wheels.request(WORN).code == "calibration_under_way"
@@ -79,13 +83,43 @@ def test_what_is_implausible_or_cannot_be_kept_leaves_the_old_one():
     failed: Future[None] = Future()
     failed.set_exception(OSError(28, "No space left on device"))
     old = replace(WORN, left=DRAWN.left * 0.99, right=DRAWN.right * 0.99)
-    wheels = WheelCalibration(DRAWN, FASTEST, old, keep=lambda base: failed)
+    wheels = Calibration(DRAWN, FASTEST, Calibrated(old, ARM), keep=lambda each: failed)
     assert wheels.request(replace(WORN, left=DRAWN.left * 0.94)).code == "calibration_of_other_wheels"
     assert wheels.request(replace(WORN, right=DRAWN.right * 1.02)).code == "calibration_of_other_wheels"
     assert wheels.request(WORN) is None
     told = wheels.kept(at_rest=True)
     assert told.code == "calibration_not_kept" and dict(told.values)["cause"] == "No space left on device"
     assert wheels.base == old
+    assert wheels.request(ARM) is None and wheels.kept(at_rest=True).code == "calibration_not_kept"
+    assert wheels.arm == ARM
+
+
+def test_offsets_are_taken_from_the_joints_angles_and_from_nothing_else():
+    calibration = Calibration(DRAWN, FASTEST, Calibrated(arm=ARM))
+    shown = calibration.measured(measurement((3.0, 4.0), (0.5, 0.7)))
+    assert shown.position.tolist() == pytest.approx([3.0, 4.0, *(0.1 - np.array(ARM.offsets))])
+    assert shown.velocity.tolist() == pytest.approx([0.5, 0.7, *[0.1] * 7])
+    assert calibration.own_angles(shown.position[2:]) == pytest.approx(np.full(7, 0.1))
+    xi = np.arange(9.0)
+    assert calibration.commanded(xi) is xi and calibration.sizes is None
+
+
+def test_base_and_arm_are_calibrated_one_after_the_other_and_each_stays():
+    disks: list[Future[None]] = [Future(), Future()]
+    left = list(disks)
+    calibration = Calibration(DRAWN, FASTEST, keep=lambda each: left.pop(0))
+    assert calibration.joint_offsets == NO_OFFSETS and calibration.request(ARM) is None
+    assert calibration.request(WORN).code == "calibration_under_way"
+    disks[0].set_result(None)
+    assert calibration.kept(at_rest=False) is None and calibration.arm is None
+    told = calibration.kept(at_rest=True)
+    assert told.code == "arm_calibration_used" and dict(told.values)["change"] == pytest.approx(np.degrees(0.03))
+    assert calibration.request(WORN) is None
+    disks[1].set_result(None)
+    assert calibration.kept(at_rest=True).code == "base_calibration_used"
+    assert (calibration.base, calibration.arm, calibration.joint_offsets) == (WORN, ARM, ARM.offsets)
+    shown = calibration.measured(measurement((50.0, 70.0)))
+    assert shown.position[2:] == pytest.approx(0.1 - np.array(ARM.offsets))
 
 
 def true_wheels(errors):
