@@ -32,6 +32,7 @@ COMMANDS = tuple(kind for kind in INTENTS if COMMAND_OF[kind].tag != "control")
 
 
 WHEELS = m.BaseCalibration(left=0.133, right=0.133, track=0.51, made_at=5.0)
+JOINTS = m.ArmCalibration(offsets=m.NO_OFFSETS, made_at=5.0)
 
 
 class World:
@@ -133,6 +134,9 @@ class World:
                 return [kind(**common, posture=each.name) for each in state.postures if each.user]
             case intents.UseBase:
                 self.robot.hear(RobotCalibration(header=m.Header(), base=WHEELS))
+                return [example(kind)]
+            case intents.UseArm:
+                self.robot.hear(RobotCalibration(header=m.Header(), arm=JOINTS))
                 return [example(kind)]
             case _:
                 return [example(kind)]

@@ -4,7 +4,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from rolling_panda import commands as intents
-from rolling_panda.messages.perception import CALIBRATION, CHECK, Capsule, CloseUpRequest
+from rolling_panda.messages.perception import ARM, CALIBRATION, CHECK, Capsule, CloseUpRequest
 from rolling_panda.model.robot import ARM_Q, RobotModel
 from tests.support.controller_at_work import CONFIG, finish, robot, run_until
 
@@ -46,6 +46,26 @@ def test_it_takes_pictures_at_rest_from_many_directions_and_comes_home_and_leave
     r, fewer = calibrating(obstacles=(post,))
     finish(r, 240.0)
     assert len({name for name, _, _ in fewer}) < len(names)
+
+
+def test_for_its_joints_the_arm_swings_its_elbow_too_and_looks_at_the_board_as_well():
+    r, pictures = calibrating(command=intents.CalibrateArm)
+    finish(r, 240.0)
+    assert r.state.mode == "READY" and r.state.reason.code == "board_seen", r.state.reason
+    names = list(dict.fromkeys(name for name, _, _ in pictures))
+    assert len(names) >= 20 and names[0] == f"{ARM}1"
+    assert all(np.abs(xi).max() < 0.01 for _, _, xi in pictures), "the camera is at rest"
+    assert np.abs([q[:3] for _, q, _ in pictures]).max() < 1e-3, "the base stands still"
+    places = np.array([q[ARM_Q] for _, q, _ in pictures])
+    assert np.ptp(places, axis=0).min() > 1.0, "every joint takes part"
+    home = np.zeros(12)
+    home[ARM_Q] = CONFIG.work.home
+    ahead = MODEL.pose(home, MODEL.camera_id)
+    board = ahead.translation + 0.45 * ahead.rotation[:, 2]
+    for _, q, _ in pictures:
+        camera = MODEL.pose(q, MODEL.camera_id)
+        assert (board - camera.translation) @ camera.rotation[:, 2] > 0.95 * np.linalg.norm(board - camera.translation)
+    assert np.abs(r.q[ARM_Q] - CONFIG.work.home).max() < 0.02 and not r.cuts
 
 
 def test_a_board_that_is_nowhere_is_told():

@@ -1,4 +1,4 @@
-"""`rolling-panda calibrate`: the board as a file, and the camera through a page that is played."""
+"""`rolling-panda calibrate`: the board as a file, and camera, base and arm through a page that is played."""
 
 import functools
 import json
@@ -40,6 +40,10 @@ WHEELS: dict[str, object] = {
 }
 
 
+OFFSETS = [0.0, 0.01, -0.002, 0.003, 0.0, 0.005, 0.0]
+JOINTS: dict[str, object] = {"made_at": 1.7e9, "views": 25, "offsets": OFFSETS, "offset_sd": 2e-5, "pixels": 0.1}
+
+
 class PlayedPage:
     """The page's server. `modes` are told one after another, the last one for ever."""
 
@@ -52,6 +56,9 @@ class PlayedPage:
         self.base: dict[str, object] | None = None
         self.base_offer: dict[str, object] | None = WHEELS
         self.base_refused: dict[str, object] | None = None
+        self.arm: dict[str, object] | None = None
+        self.arm_offer: dict[str, object] | None = JOINTS
+        self.arm_refused: dict[str, object] | None = None
         self.posted: list[tuple[str, object]] = []
 
     def answer(self, request: httpx.Request) -> httpx.Response:
@@ -60,16 +67,21 @@ class PlayedPage:
             self.posted.append((path, json.loads(request.content) if request.content else None))
             if path == "base/use" and path not in self.refusal:
                 self.base = self.base_offer
+            if path == "arm/use" and path not in self.refusal:
+                self.arm = self.arm_offer
             return httpx.Response(self.refusal.get(path, 200), json={"reason": f"{path} is told"})
         if path == "state":
             if self.interrupts and ("camera/calibrate", None) in self.posted and ("pause", None) not in self.posted:
                 raise KeyboardInterrupt
             mode = self.modes[0] if len(self.modes) == 1 else self.modes.pop(0)
-            return httpx.Response(200, json={"controller": {"mode": mode}, "bridge": {"base": self.base}})
+            return httpx.Response(
+                200, json={"controller": {"mode": mode}, "bridge": {"base": self.base, "arm": self.arm}}
+            )
         if path == "camera":
             return httpx.Response(200, json={"mount": None, "views": 7, "offer": self.offer, "refused": self.refused})
         if path == "calibration":
             found = {"base_views": 33, "base": self.base_offer, "base_refused": self.base_refused}
+            found |= {"arm_views": 25, "arm": self.arm_offer, "arm_refused": self.arm_refused}
             return httpx.Response(200, json=found)
         return httpx.Response(200, json={"events": [{"text": "25 of 25 pictures show the board"}]})
 
@@ -195,3 +207,43 @@ def test_without_a_yes_the_base_does_not_move(page: PlayedPage, monkeypatch: pyt
     monkeypatch.setattr("builtins.input", lambda _: "n")
     assert main(["calibrate", "base", LINK]) == 1
     assert [path for path, _ in page.posted] == ["sign-in"]
+
+
+def test_the_arm_is_calibrated_and_the_camera_that_was_measured_with_it_used_too(
+    page: PlayedPage, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page.offer = OFFER | {"joint_offsets": OFFSETS}
+    assert main(["calibrate", "arm", LINK, "--yes"]) == 0
+    assert page.posted == [
+        ("sign-in", {"token": "abc"}),
+        ("arm/calibrate", None),
+        ("arm/use", {"made_at": 1.7e9}),
+        ("camera/use", {"made_at": 1.8e9}),
+    ]
+    told = capsys.readouterr().out
+    assert "taken to be as drawn" in told and "joints 2 to 6 off by 0.573, -0.115, 0.172, 0.000, 0.286 degrees" in told
+
+
+def test_an_arm_whose_camera_is_not_offered_says_that_the_camera_has_to_be_calibrated(
+    page: PlayedPage, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page.offer = OFFER | {"joint_offsets": [0.0] * 7}
+    assert main(["calibrate", "arm", LINK, "--yes"]) == 1
+    assert "calibrate the camera" in capsys.readouterr().out
+    assert page.posted[-1] == ("arm/use", {"made_at": 1.7e9}), "a camera of other joints is not used"
+
+
+def test_a_refused_calibration_of_the_arm_says_why(page: PlayedPage, capsys: pytest.CaptureFixture[str]) -> None:
+    page.arm_offer, page.arm_refused = None, msgspec.to_builtins(reasons.arm_far(3, 2.4, 2.0))
+    assert main(["calibrate", "arm", LINK, "--yes"]) == 1
+    told = capsys.readouterr().out
+    assert reasons.text_of(reasons.arm_far(3, 2.4, 2.0)) in told and "stays as it is" in told
+    assert [path for path, _ in page.posted] == ["sign-in", "arm/calibrate"]
+
+
+def test_an_arm_that_the_bridge_does_not_take_is_no_success(
+    page: PlayedPage, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page.refusal = {"arm/use": 200}
+    assert main(["calibrate", "arm", LINK, "--yes"]) == 1
+    assert "not in use" in capsys.readouterr().out and page.posted[-1][0] == "arm/use"

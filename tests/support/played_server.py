@@ -43,7 +43,7 @@ STILL = (
 )
 COMMAND_NAMES = tuple(command.name for command in COMMANDS if command.process == "controller" or command.modes)
 ALLOWED = {
-    "IDLE": ("Arm", "UseCamera", "UseBase"),
+    "IDLE": ("Arm", "UseCamera", "UseBase", "UseArm"),
     "READY": (
         "Start",
         "Continue",
@@ -54,10 +54,12 @@ ALLOWED = {
         "CalibrateCamera",
         "UseBase",
         "CalibrateBase",
+        "UseArm",
+        "CalibrateArm",
     ),
     "AUTO": ("Pause",),
     "TELEOP": ("Pause", "Teleoperation"),
-    "PAUSED": ("Resume", "Continue", "UseCamera", "UseBase"),
+    "PAUSED": ("Resume", "Continue", "UseCamera", "UseBase", "UseArm"),
     "ESTOP_LATCHED": ("Reset",),
 }
 

@@ -9,7 +9,7 @@ from playwright.sync_api import Locator, Page, expect
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.messages.perception import CameraMount, CameraState, RobotCalibration
-from rolling_panda.messages.robot import BaseCalibration
+from rolling_panda.messages.robot import ArmCalibration, BaseCalibration
 from tests.support.page_parts import open_screen, show_mode
 from tests.support.played_page import box_of, until
 from tests.support.played_server import PlayedServer, bridge, controller, diagnostics
@@ -186,6 +186,34 @@ def test_the_bases_calibration_is_told_measured_and_taken_from_the_panel(page: P
     expect(row("base")).to_contain_text(measured)
     expect(row("base_offer")).to_have_text("none")
     expect(use).to_have_attribute("aria-disabled", "true")
+
+
+def test_the_arms_calibration_is_told_measured_and_taken_from_the_panel(page: Page, server: PlayedServer) -> None:
+    panel = page.locator("rp-calibration")
+    use, row = panel.locator("#use-arm"), lambda name: panel.locator(f'[data-calibration="{name}"]')
+    show_mode(page, server, controller("READY"))
+    open_screen(page, "engineer")
+    expect(row("arm")).to_have_text("none: the joints' zeros are taken to be as drawn")
+    expect(row("arm_offer")).to_have_text("none")
+    expect(use).to_have_attribute("aria-disabled", "true")
+    panel.locator("#calibrate-arm").click()
+    until(page, lambda: [path for path, _ in server.posted] == ["/api/arm/calibrate"])
+    server.calibration = RobotCalibration(header=m.Header(), arm_views=25, arm_refused=reasons.arm_unsure(0.21, 0.05))
+    expect(row("arm_offer")).to_contain_text("uncertain by 0.21°", timeout=6000)
+    expect(row("base_offer")).to_have_text("none")
+    expect(use).to_have_attribute("aria-disabled", "true")
+    offsets = (0.0, *(math.radians(each) for each in (0.5, -0.25, 0.1, 0.0, 1.0)), 0.0)
+    made = ArmCalibration(offsets=offsets, made_at=5.0, views=25, pixels=0.12, offset_sd=math.radians(0.01))
+    server.calibration = RobotCalibration(header=m.Header(), arm_views=25, arm=made)
+    measured = "from 25 pictures: joints 2 to 6 off by 0.50, -0.25, 0.10, 0.00, 1.00° (±\u00a00.01°), error 0.12 px"
+    expect(row("arm_offer")).to_contain_text(measured, timeout=6000)
+    use.click()
+    until(page, lambda: server.posted[-1] == ("/api/arm/use", {"made_at": 5.0}))
+    server.bridge = bridge(arm=made)
+    expect(row("arm")).to_contain_text(measured)
+    expect(row("arm_offer")).to_have_text("none")
+    expect(use).to_have_attribute("aria-disabled", "true")
+    expect(row("base")).to_have_text("none: the wheels are taken to be as drawn")
 
 
 def test_the_arms_commands_in_time_are_told_of_a_real_robot_alone(page: Page, server: PlayedServer) -> None:
