@@ -99,19 +99,11 @@ def test_what_does_not_tell_the_joints_is_refused_with_the_reason():
 def photographed(world, seed=3, used=NO_OFFSETS, count=16, board=True):
     """Frames of a robot whose arm and camera have the errors of a world, with these offsets in use."""
     camera, errors = Camera(CameraConfig(board=board, calibration_angle=0.0), seed, world), draw_errors(world, seed)
-    frames = []
-    for number, posture in enumerate(POSTURES[:count], 1):
-        own = posture + np.array(used)
-        frame = survey_frame(camera, Row(()), MODEL, number, arm=tuple((own - errors.joint_offset).tolist()))
-        frames.append(
-            replace(
-                frame,
-                point_id=f"{ARM}{number}",
-                number=number,
-                position=(0.0, 0.0, *posture.tolist()),
-                joint_offsets=used,
-            )
-        )
+    frames = [
+        survey_frame(camera, Row(()), MODEL, k, arm=tuple(p.tolist()), offsets=errors.joint_offset - np.array(used))
+        for k, p in enumerate(POSTURES[:count], 1)
+    ]
+    frames = [replace(frame, point_id=f"{ARM}{k}", number=k, joint_offsets=used) for k, frame in enumerate(frames, 1)]
     return frames, errors
 
 

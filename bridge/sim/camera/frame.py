@@ -1,6 +1,7 @@
 """Camera frames of a row without a bridge, as the bridge would send them: for tests and benchmarks of perception."""
 
 import msgspec
+import numpy as np
 
 from bridge.config import BridgeConfig
 from bridge.core.picture import encode_picture
@@ -48,10 +49,17 @@ def camera_frame(
 
 
 def survey_frame(
-    camera: Camera, row: Row, model: RobotModel, sequence: int, x: float = 0.0, arm: tuple[float, ...] | None = None
+    camera: Camera,
+    row: Row,
+    model: RobotModel,
+    sequence: int,
+    x: float = 0.0,
+    arm: tuple[float, ...] | None = None,
+    offsets: Array | None = None,
 ) -> CameraFrame:
-    """Frame number `sequence` of a row, taken from `survey_place(x, arm)`."""
+    """Frame number `sequence` of a row, from `survey_place(x, arm)` by encoders that are off by `offsets` (7, rad)."""
     base, position = survey_place(x, arm)
-    return camera_frame(
-        camera.render(row, camera_pose(model, base, position), sequence), camera, base, position, sequence
-    )
+    true = position
+    if offsets is not None:
+        _, true = survey_place(x, tuple((np.array(position[2:]) - offsets).tolist()))
+    return camera_frame(camera.render(row, camera_pose(model, base, true), sequence), camera, base, position, sequence)
