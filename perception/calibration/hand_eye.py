@@ -112,14 +112,14 @@ def calibrate(views: Sequence[BoardView], arm: RobotModel | None = None) -> Hand
         found = _refine(_Problem(good, found.T_flange_camera, found.T_odom_board, arm))
     if found.pixels > LARGEST_ERROR:
         raise CalibrationError(reasons.calibration_error_high(found.pixels, LARGEST_ERROR))
+    if found.offset_sd > OFFSET_SD:
+        raise CalibrationError(reasons.arm_unsure(float(np.degrees(found.offset_sd)), float(np.degrees(OFFSET_SD))))
     if found.angle_sd > ANGLE_SD or found.shift_sd > SHIFT_SD:
         raise CalibrationError(
             reasons.calibration_unsure(
                 float(np.degrees(found.angle_sd)), 1e3 * found.shift_sd, float(np.degrees(ANGLE_SD)), 1e3 * SHIFT_SD
             )
         )
-    if found.offset_sd > OFFSET_SD:
-        raise CalibrationError(reasons.arm_unsure(float(np.degrees(found.offset_sd)), float(np.degrees(OFFSET_SD))))
     return found
 
 
