@@ -17,6 +17,7 @@ from benchmarks.common.documents import bench_parser, write
 from bridge.sim.camera.config import CameraConfig
 from bridge.sim.camera.frame import survey_frame, survey_place
 from bridge.sim.camera.renderer import Camera
+from bridge.sim.camera.sensors import miscalibration
 from bridge.sim.vineyard.row import Array, Row
 from bridge.sim.world.config import PRESETS, WorldConfig
 from bridge.sim.world.errors import Errors, draw_errors
@@ -29,6 +30,7 @@ from rolling_panda.model.robot import ARM_Q, RobotModel, configuration
 
 #: Work postures: so many, with every joint up to this far from the survey posture (rad).
 _POSTURES, _SPREAD = 200, 0.6
+_CAMERA = CameraConfig(board=True)
 _HOME = np.array(ControllerConfig().work.home)
 
 
@@ -54,7 +56,7 @@ class Judged:
 def measure(seed: int, world: WorldConfig) -> tuple[Judged, Judged]:
     """Let the arm of a seed look at the board, and judge it before and after."""
     model, errors = RobotModel(), draw_errors(world, seed)
-    camera = Camera(CameraConfig(board=True), seed, world)
+    camera = Camera(_CAMERA, seed, world)
     views: list[BoardView] = []
     for number, posture in enumerate(view_postures(model, _HOME, JOINTS), 1):
         arm = tuple(posture.tolist())
@@ -79,7 +81,8 @@ def _judged(seed: int, model: RobotModel, errors: Errors, views: list[BoardView]
         true, told = (_place(model, posture - off, model.tool_id) for off in (errors.joint_offset, offsets))
         tool.append(float(np.linalg.norm(true.translation - told.translation)))
         if fit is not None:
-            mounted = model.T_flange_camera * pin.SE3(errors.hand_eye, errors.hand_eye_shift)
+            turn = errors.hand_eye @ miscalibration(_CAMERA.calibration_angle, seed)
+            mounted = model.T_flange_camera * pin.SE3(turn, errors.hand_eye_shift)
             T_true = _place(model, _HOME - errors.joint_offset, model.flange_id) * mounted
             T_told = _place(model, _HOME - offsets, model.flange_id) * fit.T_flange_camera
             point = T_told.act(T_true.actInv(true.translation))
