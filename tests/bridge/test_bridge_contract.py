@@ -17,6 +17,7 @@ from bridge.sim.robot.robot import SimulatedRobot
 from bridge.sim.vineyard.row import Row
 from rolling_panda import messages as m
 from rolling_panda.config import load_section
+from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import ARM_Q
 from rolling_panda.reasons import said
@@ -125,6 +126,13 @@ def test_calibrated_joints_are_told_as_drawn_and_end_at_their_own_limits(rig: Ri
     assert rig.until(lambda: rig.state.arm == new, REST)
     rig.run(0.3, REST)
     assert arm(rig) == pytest.approx(own - np.array(new.offsets), abs=2e-3) and rig.at_rest()
+    assert next(out.frame for out in rig.outputs if out.frame).joint_offsets == m.NO_OFFSETS
+
+    def frame() -> CameraFrame:
+        return next(out.frame for out in reversed(rig.outputs) if out.frame)
+
+    assert rig.until(lambda: frame().joint_offsets == new.offsets, REST)
+    assert frame().position[2:] == pytest.approx(arm(rig), abs=2e-3)
     # Joints 4 and 6 to their upper limits: 4 is told below its own angle, 6 above it.
     rig.run(6.0, (0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0))
     there = arm(rig) + np.array(new.offsets)
