@@ -132,11 +132,8 @@ class World:
                 return [kind(**common, posture=name) for name in free[:1]]
             case intents.DeletePosture:
                 return [kind(**common, posture=each.name) for each in state.postures if each.user]
-            case intents.UseBase:
-                self.robot.hear(RobotCalibration(header=m.Header(), base=WHEELS))
-                return [example(kind)]
-            case intents.UseArm:
-                self.robot.hear(RobotCalibration(header=m.Header(), arm=JOINTS))
+            case intents.UseBase | intents.UseArm:
+                self.robot.hear(RobotCalibration(header=m.Header(), base=WHEELS, arm=JOINTS))
                 return [example(kind)]
             case _:
                 return [example(kind)]
