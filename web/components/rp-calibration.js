@@ -24,8 +24,8 @@ const DEGREE = Math.PI / 180;
 const ROWS = /** @type {const} */ (["used", "seen", "offer", "base", "base_offer", "arm", "arm_offer"]);
 /** Parts of the robot that the bridge uses a calibration of. */
 const PARTS = /** @type {const} */ ([
-  { part: "base", calibrate: "CalibrateBase", use: "UseBase", none: "no_base_offered" },
-  { part: "arm", calibrate: "CalibrateArm", use: "UseArm", none: "no_arm_offered" },
+  { part: "base", calibrate: "CalibrateBase", use: "UseBase", none: () => reason("no_base_offered") },
+  { part: "arm", calibrate: "CalibrateArm", use: "UseArm", none: () => reason("no_arm_offered") },
 ]);
 
 class RpCalibration extends HTMLElement {
@@ -50,7 +50,7 @@ class RpCalibration extends HTMLElement {
       });
       const draw = () => {
         setEnabled(measure, whyNot(calibrate), text(`calibration.${part}_hint`));
-        setEnabled(useIt, whyNot(use) ?? (newPart(part, this.robot.get()) ? null : reason(none)), text(`calibration.${part}_use_hint`));
+        setEnabled(useIt, whyNot(use) ?? (newPart(part, this.robot.get()) ? null : none()), text(`calibration.${part}_use_hint`));
       };
       return { buttons: [measure, useIt], draw };
     });
