@@ -69,6 +69,7 @@ class HandEye:
         angle_sd: Standard deviation of the direction in which the camera looks, about the worse of its two axes (rad).
         shift_sd: The same of the position (m).
         views: Number of views.
+        view_pixels: The error of each view (px, root mean square).
         offsets: By how much the encoder of each joint of the arm is off (7, rad); zero where it was not asked for.
         offset_sd: Standard deviation of the most uncertain of them (rad).
     """
@@ -80,6 +81,7 @@ class HandEye:
     angle_sd: float
     shift_sd: float
     views: int
+    view_pixels: Array
     offsets: Array
     offset_sd: float
 
@@ -106,7 +108,7 @@ def calibrate(views: Sequence[BoardView], arm: RobotModel | None = None) -> Hand
     if arm is not None and (sd := _least_sd(_Problem(views, *first, arm))) > OFFSET_SD:
         raise CalibrationError(reasons.arm_postures_alike(float(np.degrees(sd)), float(np.degrees(OFFSET_SD))))
     found = _refine(_Problem(views, *first, arm))
-    errors = np.array([_view_error(view, found, arm) for view in views])
+    errors = found.view_pixels
     good = [view for view, error in zip(views, errors, strict=True) if error <= _OUTLIER * np.median(errors)]
     if FEWEST <= len(good) < len(views) and np.degrees(second_axis(good)) >= LEAST_TURN:
         found = _refine(_Problem(good, found.T_flange_camera, found.T_odom_board, arm))
@@ -155,6 +157,11 @@ class _Problem:
         self.views, self.arm = views, arm
         self._T_flange_camera, self._T_odom_board = T_flange_camera, T_odom_board
         self.owner = np.repeat(np.arange(len(views)), [len(view.points) for view in views])
+        self._points = np.concatenate([view.points for view in views])
+        self._pixels = np.concatenate([view.pixels for view in views])
+        self._scale = np.stack([np.diag(view.lens)[:2] for view in views])[self.owner]
+        self._centre = np.stack([view.lens[:2, 2] for view in views])[self.owner]
+        self._flanges: tuple[bytes, list[Any]] = b"", []
         self.unknowns = _UNKNOWNS + (0 if arm is None else _OFFSETS)
 
     def poses(self, x: Array) -> tuple[Any, Any, float]:
@@ -171,9 +178,17 @@ class _Problem:
 
     def errors(self, x: Array) -> Array:
         """Corners less where they are expected (px), and the prior of the focal length."""
-        poses, offsets = self.poses(x), self.offsets(x)
-        off = [_off(view, _flange(view, self.arm, offsets), *poses).ravel() for view in self.views]
-        return np.concatenate([*off, [_CORNER_SD * x[12] / _FOCAL_SD]])
+        camera, target, focal = self.poses(x)
+        offsets = self.offsets(x)
+        # Most unknowns leave the arm where it is.
+        if (key := offsets.tobytes()) != self._flanges[0]:
+            self._flanges = key, [_flange(view, self.arm, offsets) for view in self.views]
+        T_camera_board = [(T_odom_flange * camera).actInv(target) for T_odom_flange in self._flanges[1]]
+        R = np.stack([pose.rotation for pose in T_camera_board])[self.owner]
+        t = np.stack([pose.translation for pose in T_camera_board])[self.owner]
+        seen = np.einsum("nij,nj->ni", R, self._points) + t
+        expected = focal * self._scale * seen[:, :2] / seen[:, 2:] + self._centre
+        return np.append(self._pixels - expected, _CORNER_SD * x[12] / _FOCAL_SD)
 
 
 def _least_sd(problem: _Problem) -> float:
@@ -207,6 +222,7 @@ def _refine(problem: _Problem) -> HandEye:
         angle_sd=float(max(sd[0], sd[1], sd[2] / _ROLL)),
         shift_sd=float(sd[3:6].max()),
         views=count,
+        view_pixels=np.sqrt(np.bincount(problem.owner, (off**2).sum(axis=1)) / np.bincount(problem.owner)),
         offsets=problem.offsets(solved.x),
         offset_sd=float(sd[_UNKNOWNS:].max(initial=0.0)),
     )
@@ -219,18 +235,3 @@ def _flange(view: BoardView, arm: RobotModel | None, offsets: Array) -> Any:
     q = view.q.copy()
     q[ARM_Q] -= offsets
     return arm.pose(q, arm.flange_id)
-
-
-def _off(view: BoardView, T_odom_flange: Any, T_flange_camera: Any, T_odom_board: Any, focal: float) -> Array:
-    """Corners of a view less where they are expected (N×2, px)."""
-    T_camera_board = (T_odom_flange * T_flange_camera).actInv(T_odom_board)
-    seen = view.points @ T_camera_board.rotation.T + T_camera_board.translation
-    expected = focal * np.diag(view.lens)[:2] * seen[:, :2] / seen[:, 2:] + view.lens[:2, 2]
-    out: Array = view.pixels - expected
-    return out
-
-
-def _view_error(view: BoardView, found: HandEye, arm: RobotModel | None) -> float:
-    T_odom_flange = _flange(view, arm, found.offsets)
-    off = _off(view, T_odom_flange, found.T_flange_camera, found.T_odom_board, found.focal)
-    return float(np.sqrt(np.mean(np.sum(off**2, axis=1))))

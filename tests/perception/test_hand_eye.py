@@ -39,7 +39,7 @@ def seen(T_flange_camera, postures=POSTURES, noise=0.0, focal=1.0, seed=0):
         place = points @ T_camera_board.rotation.T + T_camera_board.translation
         pixels = focal * LENS[0, 0] * place[:, :2] / place[:, 2:] + LENS[:2, 2]
         pixels = pixels + noise * rng.standard_normal(pixels.shape)
-        views.append(BoardView(points, pixels, LENS, T_odom_flange, np.zeros(3)))
+        views.append(BoardView(points, pixels, LENS, T_odom_flange, np.zeros(12)))
     return views
 
 
@@ -103,7 +103,7 @@ def test_what_cannot_be_solved_is_refused_with_the_reason():
     one_axis = [HOME + [0, 0, 0, 0, 0, 0, angle] for angle in np.linspace(-0.6, 0.6, 14)]
     rng = np.random.default_rng(3)
     shaken = [dataclasses.replace(v, pixels=v.pixels + 2.5 * rng.standard_normal(v.pixels.shape)) for v in views]
-    rolled = [dataclasses.replace(v, base=np.array([0.001 * k, 0.0, 0.0])) for k, v in enumerate(views)]
+    rolled = [dataclasses.replace(v, q=np.array([0.001 * k, *[0.0] * 11])) for k, v in enumerate(views)]
     for refused, code in (
         (views[: FEWEST - 1], "calibration_few_views"),
         ([], "calibration_few_views"),
