@@ -15,7 +15,7 @@ pytestmark = [
 ]
 #: What the server answers without a session.
 PUBLIC = {"/api/health", "/version", "/api/sign-in", "/api/sign-out"}
-OPERATIONS = 72
+OPERATIONS = 76
 
 
 @pytest.fixture(scope="module")
