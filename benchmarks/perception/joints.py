@@ -138,7 +138,7 @@ def _words(judged: Sequence[Judged]) -> str:
     return (
         f"offsets mean {offsets.mean():.4f}, max {offsets.max():.4f} degrees, "
         f"tool {_mm([off for each in judged for off in each.tool])}, "
-        f"against what was seen {_mm([off for each in judged for off in each.seen])}, "
+        f"against what the camera saw {_mm([off for each in judged for off in each.seen])}, "
         f"{np.mean(pixels) if pixels else np.nan:.2f} px"
         + (f", refused {len(refused)}: {', '.join(sorted(set(refused)))}" if refused else "")
     )

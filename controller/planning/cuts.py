@@ -97,7 +97,7 @@ class CutPlanner:
     def _order(self, request: PlanRequest, cuts: dict[str, CutPlan]) -> list[str]:
         """The order of work: as people want it, points that they do not name last, else the fastest one found.
 
-        What was tried in vain comes after the others, unless people want it elsewhere.
+        Cuts with a failed try come after the others, unless people want them elsewhere.
         """
         names = list(cuts)
         if request.order:

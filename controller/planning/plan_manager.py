@@ -137,7 +137,7 @@ class PlanManager:
         self._arrange()
 
     def _tried_since(self, *names: str) -> bool:
-        """Whether one of these cuts, or any, was tried in vain since the plan, which holds for the others."""
+        """Whether a try of one of these cuts, or of any, has failed since the plan, which holds for the others."""
         made = self._queue.tries.made
         before = made if self._plan is None else self._plan.request.tries
         return tried_since(before, made, names or dict(made)) is not None
@@ -234,7 +234,7 @@ def approaches_changed(before: tuple[tuple[str, float], ...], now: tuple[tuple[s
 
 
 def tried_since(before: Made, now: Made, names: Collection[str]) -> Reason | None:
-    """Which of these points has been tried in vain since; None if none."""
+    """Which of these points has had a failed try since; None if none."""
     return next((reasons.approach_turned_after(name) for name, _ in set(now) - set(before) if name in names), None)
 
 

@@ -45,7 +45,7 @@ class PreviewRequest:
         obstacles: Obstacles.
         cuts: Cuts of the current plan by point id. For other points the posture is searched as in work.
         turned: Turn of the approach about the cane (rad) for points where a person has set it.
-        tries: Tries in vain by point, with what was in the way.
+        tries: Failed tries of each point, with the cane that was met.
         close_up_s: Time from the request of a close-up to its result (s).
     """
 

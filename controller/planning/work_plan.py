@@ -25,7 +25,7 @@ class PlanRequest:
         obstacles: Obstacles.
         turned: Turn of the approach about the cane (rad) for points where a person has set it.
         order: Points in the order set by people; empty if the plan chooses the order.
-        tries: Tries in vain by point, with what was in the way.
+        tries: Failed tries of each point, with the cane that was met.
         close_up_s: Time from the request of a close-up to its result (s).
     """
 

@@ -388,7 +388,7 @@ class PointQueue:
         return reasons.cut_ended(point_id, again)
 
     def give_up(self, point_id: str, why: Reason) -> Reason:
-        """ACCEPTED → FAILED_NOT_CUT: it is not tried again. Returns what is logged."""
+        """ACCEPTED → FAILED_NOT_CUT, without another try. Returns the line of the log."""
         why = self._after_tries(point_id, why)
         self.resolve(point_id, "FAILED_NOT_CUT", why)
         return reasons.point_not_cut(point_id, why)

@@ -264,7 +264,7 @@ class PostureSearch:
             point: The cut.
             q: Current configuration (12, map): the base keeps its distance to the row.
             azimuth: Turn of the approach about the cane (rad) set by a person; None leaves it to the search.
-            tried: Tries in vain: what is found is another approach, with room beside the canes that were met.
+            tried: Failed tries: another approach is found, with room beside the canes that were met.
         """
         position, tangent = np.array(point.position), np.array(point.tangent)
         best: CutPlan | None = None

@@ -1,4 +1,4 @@
-"""Tries that came to nothing, so that the next one of the same cut is another."""
+"""Failed tries of a cut, so that the next one takes another approach."""
 
 from msgspec import Struct
 
@@ -27,7 +27,7 @@ Made = tuple[tuple[str, tuple[Tried, ...]], ...]
 
 
 class Tries:
-    """Tries in vain by point, each of the acceptance in force."""
+    """Failed tries of each point, of the acceptance in force."""
 
     def __init__(self) -> None:
         """Begin without any."""

@@ -29,17 +29,21 @@ def calibrating(finding="seen", command=intents.CalibrateCamera, **changes):
     return r, pictures
 
 
+def taken_at_rest(pictures):
+    """Names of the pictures and postures of the arm; nothing may move meanwhile."""
+    assert all(np.abs(xi).max() < 0.01 for _, _, xi in pictures), "the camera is at rest"
+    assert np.abs([q[:3] for _, q, _ in pictures]).max() < 1e-3, "the base stands still"
+    return list(dict.fromkeys(name for name, _, _ in pictures)), np.array([q[ARM_Q] for _, q, _ in pictures])
+
+
 def test_it_takes_pictures_at_rest_from_many_directions_and_comes_home_and_leaves_out_those_among_obstacles():
     r, pictures = calibrating()
     run_until(r, lambda s: s is not None and s.mode == "AUTO", r.now + 1.0)
     assert r.state.phase == "CALIBRATION"
     finish(r, 240.0)
     assert r.state.mode == "READY" and r.state.reason.code == "board_seen", r.state.reason
-    names = list(dict.fromkeys(name for name, _, _ in pictures))
+    names, places = taken_at_rest(pictures)
     assert len(names) >= 15 and names[0] == f"{CALIBRATION}1"
-    assert all(np.abs(xi).max() < 0.01 for _, _, xi in pictures), "the camera is at rest"
-    assert np.abs([q[:3] for _, q, _ in pictures]).max() < 1e-3, "the base stands still"
-    places = np.array([q[ARM_Q] for _, q, _ in pictures])
     assert np.ptp(places, axis=0).max() > 0.8
     assert np.abs(r.q[ARM_Q] - CONFIG.work.home).max() < 0.02 and not r.cuts
     post = Capsule("post", (0.75, 0.28, 0.0), (0.75, 0.28, 2.0), 0.05, 0.05)
@@ -52,11 +56,8 @@ def test_for_its_joints_the_arm_swings_its_elbow_too_and_looks_at_the_board_as_w
     r, pictures = calibrating(command=intents.CalibrateArm)
     finish(r, 240.0)
     assert r.state.mode == "READY" and r.state.reason.code == "board_seen", r.state.reason
-    names = list(dict.fromkeys(name for name, _, _ in pictures))
+    names, places = taken_at_rest(pictures)
     assert len(names) >= 20 and names[0] == f"{ARM}1"
-    assert all(np.abs(xi).max() < 0.01 for _, _, xi in pictures), "the camera is at rest"
-    assert np.abs([q[:3] for _, q, _ in pictures]).max() < 1e-3, "the base stands still"
-    places = np.array([q[ARM_Q] for _, q, _ in pictures])
     assert np.ptp(places, axis=0).min() > 1.0, "every joint takes part"
     home = np.zeros(12)
     home[ARM_Q] = CONFIG.work.home

@@ -28,6 +28,14 @@ def test_what_was_saved_is_read_at_the_next_start(tmp_path):
     assert load(tmp_path, "rp1", MODEL) == mount()
 
 
+def check_refused(path, spoil, says, part, loaded):
+    """A spoiled file is refused with what is wrong and what to do."""
+    path.write_text(spoil(path.read_text()))
+    with pytest.raises(ConfigError) as refused:
+        loaded()
+    assert says in str(refused.value) and f"calibrate the {part} again" in str(refused.value), refused.value
+
+
 @pytest.mark.parametrize(
     ("spoil", "says"),
     [
@@ -42,11 +50,7 @@ def test_what_was_saved_is_read_at_the_next_start(tmp_path):
 )
 def test_a_file_of_another_robot_or_with_other_values_is_refused_with_what_to_do(tmp_path, spoil, says):
     save(tmp_path, "rp1", mount())
-    path = tmp_path / FILE
-    path.write_text(spoil(path.read_text()))
-    with pytest.raises(ConfigError) as refused:
-        load(tmp_path, "rp1", MODEL)
-    assert says in str(refused.value) and "calibrate the camera again" in str(refused.value), refused.value
+    check_refused(tmp_path / FILE, spoil, says, "camera", lambda: load(tmp_path, "rp1", MODEL))
 
 
 @pytest.mark.parametrize("far", [{"turn": (0.0, 0.2, 0.0)}, {"shift": (0.06, 0.0, 0.0)}])
@@ -95,11 +99,7 @@ def test_measured_wheels_are_read_at_the_next_start(tmp_path):
 )
 def test_a_file_of_other_wheels_is_refused_with_what_to_do(tmp_path, spoil, says):
     save_robot(tmp_path, "rp1", base())
-    path = tmp_path / BASE_FILE
-    path.write_text(spoil(path.read_text()))
-    with pytest.raises(ConfigError) as refused:
-        load_robot(tmp_path, "rp1", DRAWN)
-    assert says in str(refused.value) and "calibrate the base again" in str(refused.value), refused.value
+    check_refused(tmp_path / BASE_FILE, spoil, says, "base", lambda: load_robot(tmp_path, "rp1", DRAWN))
 
 
 def test_wheels_far_from_those_drawn_or_from_each_other_are_refused(tmp_path):
@@ -134,8 +134,4 @@ def test_the_joints_zeros_are_read_at_the_next_start_beside_the_wheels(tmp_path)
 )
 def test_a_file_of_another_arm_is_refused_with_what_to_do(tmp_path, spoil, says):
     save_robot(tmp_path, "rp1", ARM)
-    path = tmp_path / ARM_FILE
-    path.write_text(spoil(path.read_text()))
-    with pytest.raises(ConfigError) as refused:
-        load_robot(tmp_path, "rp1", DRAWN)
-    assert says in str(refused.value) and "calibrate the arm again" in str(refused.value), refused.value
+    check_refused(tmp_path / ARM_FILE, spoil, says, "arm", lambda: load_robot(tmp_path, "rp1", DRAWN))

@@ -1,6 +1,7 @@
 """The screen for engineers: panels that are arranged, versions, the wire, charts."""
 
 import math
+from collections.abc import Callable
 
 import msgspec
 import pytest
@@ -161,16 +162,26 @@ def test_the_cameras_calibration_is_told_checked_and_taken_from_its_panel(page: 
     expect(use).to_have_attribute("aria-disabled", "true")
 
 
-def test_the_bases_calibration_is_told_measured_and_taken_from_the_panel(page: Page, server: PlayedServer) -> None:
+def calibrated(page: Page, server: PlayedServer, part: str, none: str) -> tuple[Locator, Callable[[str], Locator]]:
+    """Press Calibrate for a part that is as drawn; its button Use, and the rows by name."""
     panel = page.locator("rp-calibration")
-    use, row = panel.locator("#use-base"), lambda name: panel.locator(f'[data-calibration="{name}"]')
+    use = panel.locator(f"#use-{part}")
+
+    def row(name: str) -> Locator:
+        return panel.locator(f'[data-calibration="{name}"]')
+
     show_mode(page, server, controller("READY"))
     open_screen(page, "engineer")
-    expect(row("base")).to_have_text("none: the wheels are taken to be as drawn")
-    expect(row("base_offer")).to_have_text("none")
+    expect(row(part)).to_have_text(none)
+    expect(row(f"{part}_offer")).to_have_text("none")
     expect(use).to_have_attribute("aria-disabled", "true")
-    panel.locator("#calibrate-base").click()
-    until(page, lambda: [path for path, _ in server.posted] == ["/api/base/calibrate"])
+    panel.locator(f"#calibrate-{part}").click()
+    until(page, lambda: [path for path, _ in server.posted] == [f"/api/{part}/calibrate"])
+    return use, row
+
+
+def test_the_bases_calibration_is_told_measured_and_taken_from_the_panel(page: Page, server: PlayedServer) -> None:
+    use, row = calibrated(page, server, "base", "none: the wheels are taken to be as drawn")
     server.calibration = RobotCalibration(header=m.Header(), base_views=33, base_refused=reasons.base_slipped(2.5, 1.0))
     expect(row("base_offer")).to_contain_text("The wheels slipped", timeout=6000)
     expect(use).to_have_attribute("aria-disabled", "true")
@@ -189,15 +200,7 @@ def test_the_bases_calibration_is_told_measured_and_taken_from_the_panel(page: P
 
 
 def test_the_arms_calibration_is_told_measured_and_taken_from_the_panel(page: Page, server: PlayedServer) -> None:
-    panel = page.locator("rp-calibration")
-    use, row = panel.locator("#use-arm"), lambda name: panel.locator(f'[data-calibration="{name}"]')
-    show_mode(page, server, controller("READY"))
-    open_screen(page, "engineer")
-    expect(row("arm")).to_have_text("none: the joints' zeros are taken to be as drawn")
-    expect(row("arm_offer")).to_have_text("none")
-    expect(use).to_have_attribute("aria-disabled", "true")
-    panel.locator("#calibrate-arm").click()
-    until(page, lambda: [path for path, _ in server.posted] == ["/api/arm/calibrate"])
+    use, row = calibrated(page, server, "arm", "none: the joints' zeros are taken to be as drawn")
     server.calibration = RobotCalibration(header=m.Header(), arm_views=25, arm_refused=reasons.arm_unsure(0.21, 0.05))
     expect(row("arm_offer")).to_contain_text("uncertain by 0.21°", timeout=6000)
     expect(row("base_offer")).to_have_text("none")
