@@ -14,7 +14,7 @@ from rolling_panda import reasons
 from rolling_panda.config import RobotConfig
 from rolling_panda.errors import RollingPandaError
 from rolling_panda.messages.types import Reason
-from rolling_panda.runtime.scheduling import set_priority
+from rolling_panda.runtime.scheduling import keep_from_children, set_priority
 
 #: Time limit for the process to end (s).
 _END_S = 2.0
@@ -73,8 +73,7 @@ class PlannerProcess:
         self._thread.join(_END_S)
 
     def _run(self) -> None:
-        # Scheduling is per thread, and the child process inherits it.
-        set_priority("background")
+        keep_from_children()
         connection: Connection | None = None
         while (request := self._next()) is not None:
             connection = connection or self._start()
@@ -121,6 +120,7 @@ class PlannerProcess:
 
 def _plan(connection: Connection, config: ControllerConfig, robot_config: RobotConfig) -> None:
     """The planner process: answers requests until its parent has ended."""
+    set_priority("background")
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, name="parent-watch", daemon=True).start()
     # Only this process imports the planners.

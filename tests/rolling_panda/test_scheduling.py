@@ -15,25 +15,25 @@ import os, sys
 from rolling_panda.runtime.scheduling import set_priority
 for priority in sys.argv[1:]:
     set_priority(priority)
-print(os.sched_getscheduler(0), os.getpriority(os.PRIO_PROCESS, 0))
+print(os.sched_getscheduler(0), os.getpriority(os.PRIO_PROCESS, 0), os.sched_getparam(0).sched_priority)
 """
 
 
-def scheduling(*priorities: str) -> tuple[int, int]:
-    """Scheduling policy and niceness of a process after setting these priorities in turn."""
+def scheduling(*priorities: str) -> tuple[int, int, int]:
+    """Policy, niceness and real-time priority of a process after setting these priorities in turn."""
     done = subprocess.run([sys.executable, "-c", SHOW, *priorities], capture_output=True, text=True, check=True)
-    policy, nice = done.stdout.split()
-    return int(policy), int(nice)
+    policy, nice, real_time = map(int, done.stdout.split())
+    return policy, nice, real_time
 
 
 def test_background_work_steps_back_even_when_its_parent_keeps_time() -> None:
-    for priorities in (("background",), ("control", "background")):
-        policy, nice = scheduling(*priorities)
+    for priorities in (("background",), ("control", "background"), ("interface", "background")):
+        policy, nice, _ = scheduling(*priorities)
         assert policy == os.SCHED_OTHER
         assert nice > 0
 
 
-def test_control_is_real_time_where_that_is_permitted() -> None:
+def test_the_control_loops_and_then_the_server_are_real_time_where_that_is_permitted() -> None:
     try:
         os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
     except PermissionError:
@@ -41,7 +41,9 @@ def test_control_is_real_time_where_that_is_permitted() -> None:
     else:
         permitted = True
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
-    assert scheduling("control")[0] == (os.SCHED_RR if permitted else os.SCHED_OTHER)
+    control, interface = scheduling("control"), scheduling("interface")
+    assert {control[0], interface[0]} == {os.SCHED_RR if permitted else os.SCHED_OTHER}
+    assert not permitted or control[2] > interface[2] > 0
 
 
 @pytest.mark.parametrize("priority", ["control", "interface", "perception", "background"])

@@ -115,10 +115,10 @@ class RenderProcess:
 def _render_until_closed(
     pipe: Connection, config: CameraConfig, seed: int, priority: Priority, world: WorldConfig
 ) -> None:
+    set_priority(priority)
     # Imported here, since ray casting and its filters are a lot of memory, which the bridge does without.
     from bridge.sim.camera.renderer import InlineRenderer
 
-    set_priority(priority)
     renderer, row = InlineRenderer(config, seed, world), Row(())
     try:
         while True:
