@@ -15,8 +15,8 @@ from tests.support.chromium import FLAGS
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Frame, Page
 
-#: Of the browser's threads, before ordinary processes and behind what keeps time.
-_NICE = -6
+#: Of the browser's threads, before all ordinary processes and behind what keeps time.
+_NICE = -19
 
 
 @contextmanager

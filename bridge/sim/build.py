@@ -96,7 +96,7 @@ def simulated_robot(
 
         renderer = InlineRenderer(lens, seed, world)
     else:
-        renderer = RenderProcess(lens, seed, "interface" if camera == "device" else "background", world)
+        renderer = RenderProcess(lens, seed, "perception" if camera == "device" else "background", world)
     return SimulatedRobot(config, row, renderer, writer, world, seed)
 
 
