@@ -8,10 +8,11 @@ from collections import deque
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
 from perception.arrays import Array, interpolate
-from perception.plant.model import Cane, Node, Plant, Spur
+from perception.plant.model import Cane, Node, Plant, Span, Spur
 from perception.plant.numbering import SpurNumber
 from rolling_panda.messages.types import Vector3
 from rolling_panda.model.wire_values import vector3
@@ -24,6 +25,8 @@ _SAME_NODE = 0.018
 _MIN_SHARE = 0.4
 #: Observations that a mean covers.
 _WINDOW = 20
+#: Stretches of a cane that are told apart by whether a frame has shown them (m), and how many there are.
+_STRETCH, _STRETCHES = 0.003, 500
 #: Number of points of a cane's line for display, and its smallest length (m).
 _LINE_POINTS, _MIN_LINE = 9, 0.02
 
@@ -80,6 +83,7 @@ class KnownCane:
         base: Estimate (3, m, odom).
         nodes: Seen at least once, by arc length.
         radii: Newest measurements (m).
+        shown: How many frames have shown each stretch, from the base.
         cut_at: Arc length of a cut that was made (m); infinite while the cane stands.
     """
 
@@ -89,6 +93,7 @@ class KnownCane:
     base: Estimate
     nodes: list[KnownNode] = field(default_factory=list)
     radii: deque[float] = field(default_factory=lambda: deque(maxlen=_WINDOW))
+    shown: NDArray[np.int64] = field(default_factory=lambda: np.zeros(_STRETCHES, dtype=np.int64))
     cut_at: float = np.inf
 
     @classmethod
@@ -97,12 +102,14 @@ class KnownCane:
         known = cls(number, cane, Estimate.of(np.array([cane.radius])), Estimate.of(cane.base))
         known.nodes = [KnownNode(Estimate.of(np.array([node.arc])), node.pixels) for node in cane.nodes]
         known.radii.append(cane.radius)
+        known.shown += _shown(cane)
         return known
 
     def add(self, cane: Cane) -> None:
         """Add an observation."""
         self.radius.add(np.array([cane.radius]))
         self.radii.append(cane.radius)
+        self.shown += _shown(cane)
         self.base.add(cane.base)
         if _unseen(cane) < _unseen(self.best) and cane.length > 0.2:
             self.best = cane
@@ -116,9 +123,42 @@ class KnownCane:
                 self.nodes.append(KnownNode(Estimate.of(np.array([node.arc])), node.pixels))
         self.nodes.sort(key=lambda node: node.arc)
 
-    def with_median_radius(self, cane: Cane) -> Cane:
-        """An observation of it with its number and the median radius of all: single ones may include wood beside it."""
-        return replace(cane, radius=float(np.median(self.radii)), observations=len(self.radii), number=self.number)
+    def with_other_views(self, cane: Cane) -> Cane:
+        """An observation of it with its number, and what other frames have shown of it.
+
+        That is the median radius, as single ones may include wood beside it, and what lies in the stretches that this
+        one does not show: they are hidden no longer, and have the nodes that were seen there.
+        """
+        hidden = [span for part in cane.hidden for span in self._unseen_of(part)]
+        nodes = [*cane.nodes]
+        for node in self.nodes:
+            inside = any(part.start <= node.arc <= part.end for part in cane.hidden)
+            if inside and self._confirms(node) and all(abs(node.arc - own.arc) >= _SAME_NODE for own in cane.nodes):
+                nodes.append(Node(node.arc, node.pixels))
+        return replace(
+            cane,
+            radius=float(np.median(self.radii)),
+            nodes=tuple(sorted(nodes, key=lambda node: node.arc)),
+            hidden=tuple(hidden),
+            observations=len(self.radii),
+            number=self.number,
+        )
+
+    def _confirms(self, node: KnownNode) -> bool:
+        """Whether enough of the frames that have shown its place have shown a node there."""
+        return node.estimate.count >= max(1.0, _MIN_SHARE * float(self.shown[_stretch(node.arc)]))
+
+    def _unseen_of(self, part: Span) -> list[Span]:
+        """The stretches of a hidden one that no frame has shown."""
+        first, last = _stretch(part.start), _stretch(part.end)
+        unseen = np.flatnonzero(self.shown[first : last + 1] == 0)
+        if not len(unseen):
+            return []
+        runs = np.split(unseen, np.flatnonzero(np.diff(unseen) > 1) + 1)
+        return [
+            Span(max(part.start, _STRETCH * (first + run[0])), min(part.end, _STRETCH * (first + run[-1] + 1)))
+            for run in runs
+        ]
 
     def as_cane(self) -> Cane:
         """The best observation with the radius and the confirmed nodes of all, up to a cut.
@@ -180,7 +220,7 @@ class KnownSpur:
         """The standing canes that at least half of the observations have shown, but this one does not."""
         numbers = {cane.number for cane in seen}
         return tuple(
-            cane.with_median_radius(cane.best)
+            cane.with_other_views(cane.best)
             for cane in self.canes
             if cane.number not in numbers and 2 * cane.base.count >= self.position.count and np.isinf(cane.cut_at)
         )
@@ -216,7 +256,7 @@ class PlantMap:
         self._spurs: dict[SpurNumber, KnownSpur] = {}
 
     def update(self, plant: Plant, numbers: tuple[SpurNumber, ...]) -> tuple[Spur, ...]:
-        """Add the plant of one frame; returns its spurs with the median stub, and with the median radius of each cane.
+        """Add the plant of one frame; returns its spurs with the median stub, and their canes as all frames show them.
 
         They have the hidden canes that at least half of the observations have shown.
 
@@ -233,7 +273,7 @@ class PlantMap:
                 known.position.add(spur.position)
                 if not spur.incomplete and (known.best.incomplete or len(spur.canes) > len(known.best.canes)):
                     known.best = spur
-            seen = tuple(_associate(known, cane).with_median_radius(cane) for cane in spur.canes)
+            seen = tuple(_associate(known, cane).with_other_views(cane) for cane in spur.canes)
             out.append(replace(known.with_median_stub(spur), canes=seen, hidden=known.hidden_canes(seen)))
         return tuple(out)
 
@@ -292,6 +332,19 @@ def _axis_distance(first: Cane, second: Cane) -> float:
     if len(near) < 2:
         near = second.axis
     return float(np.median(cdist(near, first.axis).min(axis=1)))
+
+
+def _stretch(arc: float) -> int:
+    return min(max(int(arc / _STRETCH), 0), _STRETCHES - 1)
+
+
+def _shown(cane: Cane) -> NDArray[np.int64]:
+    """Of each stretch whether this observation shows the whole of it."""
+    shown = np.zeros(_STRETCHES, dtype=np.int64)
+    shown[_stretch(float(cane.arc[0])) : _stretch(cane.length)] = 1
+    for span in cane.hidden:
+        shown[_stretch(span.start) : _stretch(span.end) + 1] = 0
+    return shown
 
 
 def _unseen(cane: Cane) -> float:

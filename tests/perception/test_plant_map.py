@@ -100,6 +100,26 @@ def test_the_look_that_hid_less_gives_the_shape():
     assert fused.hidden == () and fused.base_gap == 0.0
 
 
+def test_what_one_look_hides_and_another_shows_is_known():
+    map_, hides = PlantMap(), cane(nodes=(0.02, 0.18, 0.26), hidden=(Span(0.07, 0.13), Span(0.30, 0.36)))
+    (alone,) = map_.update(plant(hides), (NUMBER,))[0].canes
+    assert alone.hidden == hides.hidden and alone.nodes == hides.nodes
+    map_.update(plant(cane(hidden=(Span(0.33, 0.45),))), (NUMBER,))
+    (told,) = map_.update(plant(hides), (NUMBER,))[0].canes
+    assert [round(node.arc, 2) for node in told.nodes] == [0.02, 0.10, 0.18, 0.26]
+    (span,) = told.hidden
+    assert span.start == pytest.approx(0.33, abs=0.004) and span.end == pytest.approx(0.36, abs=0.004)
+
+
+def test_a_node_in_a_hidden_stretch_counts_only_if_enough_of_the_looks_that_show_it_do():
+    hides = plant(cane(nodes=(0.02, 0.18), hidden=(Span(0.07, 0.13),)))
+    shows, bare = plant(cane(nodes=(0.02, 0.10, 0.18))), plant(cane(nodes=(0.02, 0.18)))
+    for looks, nodes in (((shows, bare, bare), 2), ((shows, hides, hides, hides), 3)):
+        map_ = known(*looks)
+        (told,) = map_.update(hides, (NUMBER,))[0].canes
+        assert len(told.nodes) == nodes
+
+
 def test_after_a_cut_what_lay_beyond_is_gone():
     map_ = known(*[plant(cane())] * 3)
     assert map_.sever(np.array([0.001, 0.0, 0.95 + 0.20]))
