@@ -416,6 +416,11 @@ def control_asked(user: str, holder: str) -> None:
     """{user} asks {holder} for control."""
 
 
+@_reason("info", "")
+def control_unanswered(user: str, holder: str) -> None:
+    """{holder} has not answered: {user} may ask again."""
+
+
 @_reason("warning", "")
 def control_returned(user: str) -> None:
     """{user} gave control back."""
@@ -1588,7 +1593,7 @@ def past_node(distance_mm: float, node: float) -> None:
 
 @_reason("info", "")
 def midway_past_node(distance_mm: float, node: float) -> None:
-    """{distance_mm:.0f} mm past bud {node:.0f}, midway on: {node:.0f} {node:bud|buds} and the basal bud stay."""
+    """{distance_mm:.0f} mm past bud {node:.0f}, half the way on: {node:.0f} {node:bud|buds} and the basal bud stay."""
 
 
 @_reason("info", "")
@@ -1766,7 +1771,7 @@ def cane_below_keeper() -> None:
 
 @_reason("info", "")
 def stub_too_short(length_mm: float) -> None:
-    """The stub is free over {length_mm:.0f} mm only."""
+    """Only {length_mm:.0f} mm of the stub are free."""
 
 
 @_reason("info", "")

@@ -96,7 +96,8 @@ class Lease:
             at_rest: Whether the robot is at rest, so that control may change hands.
             now: Monotonic time (s).
         """
-        if self.requested is not None and now - self._asked > _REQUEST_S:
+        if self.requested is not None and self.holder is not None and now - self._asked > _REQUEST_S:
+            self._notify(reasons.control_unanswered(self.requested.user, self.holder.user))
             self.requested = None
         lost, self._lost = self._lost, None
         if self.holder is not None and self.left(now) <= 0.0:

@@ -106,7 +106,7 @@ def test_a_request_is_granted_by_the_holder_alone():
     assert it.held_by(BOB) and it.requested is None
 
 
-def test_a_request_is_forgotten_in_time():
+def test_a_request_is_forgotten_in_time_and_both_are_told():
     it = Lease()
     it.claim(ADA, 100.0)
     it.request(BOB, 100.0)
@@ -115,6 +115,8 @@ def test_a_request_is_forgotten_in_time():
         it.renew({"a": now})
         it.review(True, now)
         assert it.held_by(ADA) and it.requested == (BOB if tick <= 300 else None)
+        told = reasons.control_asked("Bob", "Ada") if tick <= 300 else reasons.control_unanswered("Bob", "Ada")
+        assert it.notice == told
 
 
 def test_control_is_given_back_by_its_holder():

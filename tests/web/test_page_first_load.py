@@ -67,8 +67,11 @@ def test_a_server_that_takes_two_seconds_for_its_first_word_is_no_alarm(fresh: P
     server.attach(fresh)
     fresh.goto(f"{ORIGIN}/")
     expect(fresh.locator("#link")).to_have_text("connecting…")
+    # What there is to cut is not known yet.
+    expect(fresh.locator("rp-vines")).to_have_text("Loading…")
     fresh.wait_for_timeout(2000)
     server.begin()
+    expect(fresh.locator("rp-vines")).not_to_contain_text("Loading…")
     expect(fresh.locator("#mode")).to_have_attribute("data-mode", "READY")
     expect(fresh.locator("#link")).to_contain_text("ms")
     assert fresh.evaluate("alarming") == []

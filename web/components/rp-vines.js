@@ -26,7 +26,7 @@ class RpVines extends HTMLElement {
 /** @param {readonly import("../js/control/progress.js").VineProgress[]} all */
 function wordsOf(all) {
   const sum = (/** @type {"done"|"count"} */ name) => all.reduce((total, vine) => total + vine[name], 0);
-  if (sum("count") === 0) return text("vines.none");
+  if (sum("count") === 0) return text(points.get() ? "vines.none" : "screen.loading");
   const seconds = timeLeft();
   const left = seconds ? ` · ${text("vines.left", { time: durationWords(seconds).replaceAll(" ", "\u00a0") })}` : "";
   return text("vines.done", { done: sum("done"), count: sum("count") }) + left;

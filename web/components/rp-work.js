@@ -128,7 +128,8 @@ function needs() {
       countOf("UNREACHABLE") > 0 ? counted("work.beyond", countOf("UNREACHABLE")) : "",
     ].filter(Boolean);
     // A line ends between two of them alone.
-    const words = all.length > 0 ? all.map((each) => each.replaceAll(" ", "\u00a0")).join("\u00a0· ") : text("work.nothing");
+    const calm = text(points.get() ? "work.nothing" : "screen.loading");
+    const words = all.map((each) => each.replaceAll(" ", "\u00a0")).join("\u00a0· ") || calm;
     link.classList.toggle("calm", all.length === 0);
     setText(link, words);
     link.title = words;
