@@ -30,6 +30,7 @@ from bridge.sim.camera.frame import camera_frame, camera_pose, survey_place
 from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
+from bridge.sim.world.config import CALM, PRESETS, WorldConfig, only
 from controller.config import WorkConfig
 from perception.config import PerceptionConfig, RuleConfig
 from perception.pipeline import Perception
@@ -38,8 +39,11 @@ from perception.segmentation.segmenter import SEGMENTERS, choose_segmenter
 from rolling_panda import messages as m
 from rolling_panda.model.robot import RobotModel
 
-#: Vines of a row, and the way between two frames (m): two a second at the survey's default speed of 0.25 m/s.
+#: Vines of a row, and the way between two frames (m): two a second at the survey's default speed (m/s).
 ROW_VINES, STEP = 3, 0.125
+SPEED = 0.25
+#: What disturbs the colour picture, for `--light`.
+LIGHT = ("sunlight", "glare", "wet", "exposure")
 #: Nodes that stay, by the kind of cut.
 KEPT = {"spur cut": 2, "cane cut": 8}
 #: The camera stands so far ahead of the base in the survey posture (m), and begins before the first trunk.
@@ -76,6 +80,7 @@ def survey_row(
     gallery: Path | None = None,
     looks: Looks | None = None,
     step: float = STEP,
+    world: WorldConfig = CALM,
 ) -> None:
     """Drive along one row.
 
@@ -89,11 +94,12 @@ def survey_row(
         gallery: Folder for pictures of wrong points.
         looks: Takes what a second look at each point comes to; None leaves it at the survey.
         step: Way between two frames (m).
+        world: Disturbances of the camera.
     """
     guyot = perception.config.rule.system == "guyot"
     config = VineyardConfig(vines=vines, training="guyot" if guyot else "cordon")
     row = grow(config, seed)
-    camera = Camera(camera_config, seed)
+    camera = Camera(camera_config, seed, world)
     opinion = GuyotJudge(row, seed) if guyot else RowJudge(row, seed)
     first = config.first_vine_x - config.vine_spacing / 2
     last = first + vines * config.vine_spacing
@@ -106,7 +112,7 @@ def survey_row(
     for sequence, (x, arm) in enumerate(way):
         base, position = survey_place(x, arm)
         place = camera_pose(model, base, position)
-        image = camera.render(row, place, sequence)
+        image = camera.render(row, place, sequence, np.array([SPEED if arm is None else -SPEED, *[0.0] * 5]))
         frame = camera_frame(image, camera, base, position, sequence)
         opinion.look(image, camera.intrinsics, place)
         began = time.perf_counter()
@@ -204,6 +210,9 @@ def main(argv: Sequence[str]) -> int:
         action="store_true",
         help="survey one row of so many vines instead, and tell what each vine's frames cost",
     )
+    parser.add_argument(
+        "--light", choices=tuple(PRESETS), default="calm", help="sun, glare, wet bark and blur of a preset"
+    )
     parser.add_argument("--gallery", type=Path, metavar="DIR", help="put pictures of wrong points here")
     words = parser.parse_args(argv)
     if words.seed < 0 or words.vines < 1:
@@ -220,7 +229,8 @@ def main(argv: Sequence[str]) -> int:
         perception = Perception(PerceptionConfig(fuse=words.fuse, rule=rule), segmenter, model)
         seed, vines = words.seed + number, min(ROW_VINES, words.vines - done)
         before = len(survey.points)
-        survey_row(seed, vines, perception, model, CameraConfig(), survey, words.gallery, looks, words.step)
+        world = only(LIGHT, words.light)
+        survey_row(seed, vines, perception, model, CameraConfig(), survey, words.gallery, looks, words.step, world)
         new = survey.points[before:]
         print(f"seed {seed}: {vines} vines, {len(new)} points, {sum(p.right for p in new)} right", flush=True)
     summary = summarise(survey) | ({} if looks is None else summarise_looks(looks))
@@ -233,6 +243,7 @@ def main(argv: Sequence[str]) -> int:
         "vines": words.vines,
         "segmenter": words.segmenter,
         "step_m": words.step,
+        "light": words.light,
         "fuse": words.fuse,
         "training_system": words.training_system,
         "looks": words.looks,

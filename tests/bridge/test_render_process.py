@@ -33,15 +33,15 @@ def test_beside_the_physics_the_pictures_are_the_same_and_a_killed_renderer_come
     inline, beside = InlineRenderer(LENS, 7), RenderProcess(LENS, 7)
     try:
         for row in (ROW, ROW, Row(())):
-            assert inline.expose(row, EYE, 0.0)
-            assert beside.expose(row, EYE, 0.0)
-            assert not beside.expose(row, EYE, 0.0)
+            assert inline.expose(row, EYE, 0.0, np.zeros(6))
+            assert beside.expose(row, EYE, 0.0, np.zeros(6))
+            assert not beside.expose(row, EYE, 0.0, np.zeros(6))
             assert wait(beside) == inline.ready()
             assert inline.ready() is None
             assert beside.ready() is None
         (process,) = set(active_children()) - others
         process.kill()
-        assert beside.expose(ROW, EYE, 0.0)
+        assert beside.expose(ROW, EYE, 0.0, np.zeros(6))
         assert wait(beside).intrinsics == LENS.intrinsics()
     finally:
         beside.close()

@@ -237,7 +237,7 @@ def test_a_frame_is_exposed_later_than_its_joint_state_where_the_camera_has_no_t
     class Noting(Blind):
         at: list[float] = []
 
-        def expose(self, row: Row, T_world_camera: np.ndarray, at: float) -> bool:
+        def expose(self, row: Row, T_world_camera: np.ndarray, at: float, velocity: np.ndarray) -> bool:
             self.at.append(at)
             return True
 
@@ -253,6 +253,29 @@ def test_a_frame_is_exposed_later_than_its_joint_state_where_the_camera_has_no_t
             delays.append(camera.at[-1] - begin)
     assert max(delays[:20]) == 0.0
     assert np.mean(delays[20:]) == pytest.approx(STORM.frame_delay, abs=0.012) and np.std(delays[20:]) > 0.005
+
+
+def test_each_exposure_has_the_true_speed_of_the_camera() -> None:
+    class Noting(Blind):
+        velocity = np.zeros(6)
+
+        def expose(self, row: Row, T_world_camera: np.ndarray, at: float, velocity: np.ndarray) -> bool:
+            self.velocity = velocity
+            return True
+
+    camera = Noting()
+    sim = SimulatedRobot(CONFIG, Row(()), camera, None, CALM, 1)
+    turning = Setpoint(np.array([*DRIVE.wheels(0.25, 0.2), 0.3, *[0.0] * 6]), True, 1, 1, 0.0)
+    for _ in range(600):
+        before = sim.true_camera()
+        sim.write(turning)
+    sim.capture(True)
+    after = sim.true_camera()
+    linear = 1000 * (after[:3, 3] - before[:3, 3])
+    twist = 1000 * (after[:3, :3] @ before[:3, :3].T)
+    angular = [twist[2, 1], twist[0, 2], twist[1, 0]]
+    assert np.linalg.norm(linear) > 0.2 and angular[2] > 0.4
+    assert camera.velocity == pytest.approx([*linear, *angular], abs=0.01)
 
 
 def _upright(kind: str, x: float, radius: float, **numbers: int) -> Rod:

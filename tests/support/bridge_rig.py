@@ -164,7 +164,7 @@ class NoCamera:
     def __init__(self) -> None:
         self._ready: Picture | None = None
 
-    def expose(self, row: object, T_world_camera: Array, at: float) -> bool:
+    def expose(self, row: object, T_world_camera: Array, at: float, velocity: Array) -> bool:
         self._ready = PICTURE
         return True
 

@@ -17,7 +17,7 @@ def looking_left(x: float = 0.0, y: float = 0.0, z: float = 1.0) -> Array:
 class Blind:
     """A renderer without a camera."""
 
-    def expose(self, row: Row, T_world_camera: Array, at: float) -> bool:
+    def expose(self, row: Row, T_world_camera: Array, at: float, velocity: Array) -> bool:
         return False
 
     def ready(self) -> Picture | None:

@@ -69,6 +69,14 @@ class RodMesh:
         rod = np.where(hit, self._owner[np.where(hit, triangle, 0)], -1).astype(np.int32)
         return Hits(rod, np.where(hit, result["tfar"], np.inf).astype(np.float32))
 
+    def occluded(self, origins: Floats, directions: Floats) -> NDArray[np.bool_]:
+        """Whether rays hit anything (N): origins (N, 3) and directions (N, 3), or one for all (3)."""
+        if self._scene is None or not len(origins):
+            return np.zeros(len(origins), np.bool_)
+        towards = np.ascontiguousarray(np.broadcast_to(directions, origins.shape))
+        blocked: NDArray[np.bool_] = self._scene.run(origins, towards, query="OCCLUDED") >= 0
+        return blocked
+
 
 def tubes(rods: list[Rod], sides: int) -> tuple[Floats, Indices]:
     """Closed tapered prisms: vertices (N·(2·sides + 2), 3) and faces, the same number for each rod, rod by rod.

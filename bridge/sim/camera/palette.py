@@ -54,12 +54,13 @@ class Appearance:
     exposure: Floats
 
 
-def draw_appearance(seed: int, spread: float) -> Appearance:
+def draw_appearance(seed: int, spread: float, clear: bool = False) -> Appearance:
     """Random appearance of a scene.
 
     Args:
         seed: Not negative.
         spread: 0 gives the same appearance to all seeds; 1 is the variety of one winter, larger for training.
+        clear: Without clouds.
     """
     rng = np.random.default_rng([seed, 11])
     colors = np.array([_BASE[kind] for kind in WOOD_CLASSES])
@@ -69,7 +70,7 @@ def draw_appearance(seed: int, spread: float) -> Appearance:
     soil = rng.dirichlet([1.0, 1.0, 1.0])
     ground = soil @ np.stack([_GRASS, _SOIL, _STRAW])
     colors[WOOD_CLASSES.index("ground")] += min(spread, 1.0) * (ground - _GRASS)
-    overcast = min(spread, 1.0) * float(rng.uniform(0.0, 1.0))
+    overcast = min(spread, 1.0) * float(rng.uniform(0.0, 1.0)) * (not clear)
     sun = _SUN + spread * rng.normal(0.0, 0.35, 3)
     sun[2] = max(sun[2], 0.15)
     exposure = np.exp(spread * (rng.normal(0.0, 0.18) + rng.normal(0.0, 0.03, 3)))
@@ -93,14 +94,9 @@ _TEXTURE_SIZE = 256
 class Palette:
     """Colours and textures of one scene."""
 
-    def __init__(self, seed: int, spread: float = 1.0) -> None:
-        """Draw colours and textures.
-
-        Args:
-            seed: Not negative.
-            spread: As of `draw_appearance`.
-        """
-        self._look = draw_appearance(seed, spread)
+    def __init__(self, seed: int, spread: float = 1.0, clear: bool = False) -> None:
+        """Draw colours and textures; arguments as of `draw_appearance`."""
+        self.look = draw_appearance(seed, spread, clear)
         rng = np.random.default_rng([seed, 1])
         self._tint = rng.uniform(0.86, 1.14, 4096).astype(np.float32)
         noise = np.zeros((_TEXTURE_SIZE, _TEXTURE_SIZE), np.float32)
@@ -110,7 +106,7 @@ class Palette:
             noise += smooth / smooth.std()
         self._noise = np.clip(noise / noise.std(), -2.0, 2.0).astype(np.float32) / 2.0
 
-    def wood(self, rod: Indices, kind: Bytes, along: Floats, normal: Floats) -> Floats:
+    def wood(self, rod: Indices, kind: Bytes, along: Floats, normal: Floats, lit: Floats | None = None) -> Floats:
         """Colours (N, 3) of points on rods.
 
         Args:
@@ -118,26 +114,38 @@ class Palette:
             kind: Its class (N).
             along: Distance from the rod's start (N, m).
             normal: Outward unit normals (N, 3, world).
+            lit: Factors by their light (N, 3); None for the scene's own.
         """
         grain = self._noise[(along * 900.0).astype(np.int64) % _TEXTURE_SIZE, rod % _TEXTURE_SIZE]
-        light = self._look.ambient + self._look.diffuse * np.maximum(normal @ self._look.sun, 0.0)
-        bright = light * self._tint[rod % 4096] * (1.0 + 0.16 * grain)
-        color: Floats = self._look.colors[kind] * bright[:, None] * self._look.exposure
+        if lit is None:
+            light = self.look.ambient + self.look.diffuse * np.maximum(normal @ self.look.sun, 0.0)
+            bright = (light * self._tint[rod % 4096] * (1.0 + 0.16 * grain))[:, None]
+        else:
+            bright = lit * (self._tint[rod % 4096] * (1.0 + 0.16 * grain))[:, None]
+        color: Floats = self.look.colors[kind] * bright * self.look.exposure
         return color
 
-    def ground(self, x: Floats, y: Floats, distance: Floats) -> Floats:
-        """Colours (N, 3) of points on the ground (m, world): grass and soil with haze."""
+    def wet(self, share: float, rod: Indices, along: Floats) -> NDArray[np.bool_]:
+        """Whether points on rods (N) are in patches that cover this share of them."""
+        patch = self._noise[(along * 150.0 + 37.0 * rod).astype(np.int64) % _TEXTURE_SIZE, rod % _TEXTURE_SIZE]
+        covered: NDArray[np.bool_] = patch <= np.quantile(self._noise, share)
+        return covered
+
+    def ground(self, x: Floats, y: Floats, distance: Floats, lit: Floats | None = None) -> Floats:
+        """Colours (N, 3) of points on the ground (m, world): grass and soil with haze; `lit` as of `wood`."""
         fine = self._noise[(x * 60.0).astype(np.int64) % _TEXTURE_SIZE, (y * 60.0).astype(np.int64) % _TEXTURE_SIZE]
         broad = self._noise[(x * 5.0).astype(np.int64) % _TEXTURE_SIZE, (y * 5.0).astype(np.int64) % _TEXTURE_SIZE]
         bright = 1.0 + 0.35 * fine + 0.25 * broad
-        color = self._look.colors[_GROUND] * bright[:, None]
+        color = self.look.colors[_GROUND] * bright[:, None]
         color[:, 0] += 22.0 * broad
+        if lit is not None:
+            color *= lit
         haze = (1.0 - np.exp(-distance / 25.0))[:, None]
-        hazy: Floats = (color * (1.0 - haze) + self._look.horizon * haze) * self._look.exposure
+        hazy: Floats = (color * (1.0 - haze) + self.look.horizon * haze) * self.look.exposure
         return hazy
 
     def sky(self, elevation: Floats) -> Floats:
         """Colours (N, 3) for the sine of the elevation (N)."""
         high = np.sqrt(np.clip(elevation, 0.0, 1.0))[:, None]
-        look = self._look
+        look = self.look
         return ((look.horizon * (1.0 - high) + look.zenith * high) * look.exposure).astype(np.float32)

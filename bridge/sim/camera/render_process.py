@@ -18,8 +18,15 @@ from rolling_panda.runtime.scheduling import Priority, set_priority
 class CameraRenderer(Protocol):
     """Renders exposures."""
 
-    def expose(self, row: Row, T_world_camera: Array, at: float) -> bool:
-        """Start an exposure of the present row at a simulated time (s); False while the last one is not ready."""
+    def expose(self, row: Row, T_world_camera: Array, at: float, velocity: Array) -> bool:
+        """Start an exposure of the present row; False while the last one is not ready.
+
+        Args:
+            row: The row.
+            T_world_camera: Pose of the camera (4×4).
+            at: Simulated time (s).
+            velocity: Of the camera, linear (m/s) and angular (rad/s) in the world's axes (6).
+        """
 
     def ready(self) -> Picture | None:
         """The finished picture, once; None without one."""
@@ -49,18 +56,18 @@ class RenderProcess:
         self._known: Row | None = None
         self._process, self._pipe = self._start()
         self._closing = False
-        self._requests: queue.SimpleQueue[tuple[Row, Array, float] | None] = queue.SimpleQueue()
+        self._requests: queue.SimpleQueue[tuple[Row, Array, float, Array] | None] = queue.SimpleQueue()
         self._picture: Picture | None = None
         self._busy = False
         self._thread = threading.Thread(target=self._wait_for_pictures, name="camera-pipe", daemon=True)
         self._thread.start()
 
-    def expose(self, row: Row, T_world_camera: Array, at: float) -> bool:
+    def expose(self, row: Row, T_world_camera: Array, at: float, velocity: Array) -> bool:
         """Request a picture; the row is sent only when it has changed."""
         if self._busy:
             return False
         self._busy = True
-        self._requests.put((row, T_world_camera, at))
+        self._requests.put((row, T_world_camera, at, velocity))
         return True
 
     def ready(self) -> Picture | None:
@@ -96,10 +103,10 @@ class RenderProcess:
         while (request := self._requests.get()) is not None:
             self._picture = self._render(*request)
 
-    def _render(self, row: Row, T_world_camera: Array, at: float) -> Picture | None:
+    def _render(self, row: Row, T_world_camera: Array, at: float, velocity: Array) -> Picture | None:
         while not self._closing:
             try:
-                self._pipe.send((None if row is self._known else row, T_world_camera, at))
+                self._pipe.send((None if row is self._known else row, T_world_camera, at, velocity))
                 self._known = row
                 picture: Picture = self._pipe.recv()
                 return picture
@@ -122,9 +129,9 @@ def _render_until_closed(
     renderer, row = InlineRenderer(config, seed, world), Row(())
     try:
         while True:
-            changed, T_world_camera, at = pipe.recv()
+            changed, T_world_camera, at, velocity = pipe.recv()
             row = row if changed is None else changed
-            renderer.expose(row, T_world_camera, at)
+            renderer.expose(row, T_world_camera, at, velocity)
             pipe.send(renderer.ready())
     except (EOFError, BrokenPipeError, KeyboardInterrupt):
         return

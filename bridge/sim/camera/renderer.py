@@ -7,6 +7,7 @@ import numpy as np
 from bridge.core.picture import Picture, encode_picture
 from bridge.sim.camera.board import StandingBoard
 from bridge.sim.camera.config import CameraConfig
+from bridge.sim.camera.light import Light, blurred
 from bridge.sim.camera.mesh import Floats, Indices, RodMesh
 from bridge.sim.camera.palette import Bytes, Palette
 from bridge.sim.camera.sensors import color_sensor, depth_sensor, miscalibration
@@ -17,6 +18,8 @@ from bridge.sim.world.wind import Wind
 from rolling_panda.messages.types import WOOD_CLASSES
 
 _GROUND = WOOD_CLASSES.index("ground")
+#: A film of water does not darken these.
+_TIGHT = [WOOD_CLASSES.index("wire"), WOOD_CLASSES.index("hose")]
 
 
 @dataclass(frozen=True)
@@ -45,17 +48,22 @@ class Camera:
         Args:
             config: Image size, lens and noise.
             seed: Of noise and colours; not negative.
-            world: Disturbances: where the camera is on the tool, its lens, and sun on thin wood.
+            world: Disturbances: where the camera is on the tool, its lens, and light.
         """
         self.config = config or CameraConfig()
         self.intrinsics = self.config.intrinsics()
         self._seed = seed
-        self._palette = Palette(seed, self.config.appearance)
+        self._palette = Palette(seed, self.config.appearance, clear=world.sunlight > 0.0)
+        shown = world.sunlight > 0.0 or world.wet > 0.0
+        self._light = Light(world, self._palette.look, seed) if shown else None
+        if self._light is not None:
+            self._palette.look = self._light.look
+        self._exposure = world.exposure
         errors = draw_errors(world, seed)
         self._turn = (errors.hand_eye @ miscalibration(self.config.calibration_angle, seed)).astype(np.float32)
         self._shift, self._thin_lost = errors.hand_eye_shift, world.depth_lost
         k = self.intrinsics
-        fx, fy = k.fx * errors.focal, k.fy * errors.focal
+        fx, fy = self._focal = k.fx * errors.focal, k.fy * errors.focal
         u, v = np.meshgrid((np.arange(k.width) - k.cx) / fx, (np.arange(k.height) - k.cy) / fy)
         # Rays have length 1 along the optical axis, so that their distances are depths.
         self._rays = np.stack([u, v, np.ones_like(u)], -1).reshape(-1, 3).astype(np.float32)
@@ -64,18 +72,20 @@ class Camera:
         self._row: Row | None = None
         self._mesh = RodMesh(Row(()))
 
-    def render(self, row: Row, T_world_camera: Array, frame: int = 0) -> RgbdImage:
+    def render(self, row: Row, T_world_camera: Array, frame: int = 0, velocity: Array | None = None) -> RgbdImage:
         """Colour, depth and labels of `row` and of the ground z = 0.
 
         Args:
             row: The row.
             T_world_camera: Homogeneous pose (4×4) of the optical frame: z forward, x right, y down.
             frame: Number of the frame; the same number gives the same noise.
+            velocity: Of the camera, linear (m/s) and angular (rad/s) in the world's axes (6); None at rest.
         """
         if row is not self._row:
             self._mesh, self._row = RodMesh(row), row
         origin = (T_world_camera[:3, 3] + T_world_camera[:3, :3] @ self._shift).astype(np.float32)
-        rays: Floats = self._rays @ (T_world_camera[:3, :3].astype(np.float32) @ self._turn).T
+        turn: Floats = T_world_camera[:3, :3].astype(np.float32) @ self._turn
+        rays: Floats = self._rays @ turn.T
         hits = self._mesh.first_hits(np.broadcast_to(origin, rays.shape).copy(), rays)
         depth = hits.distance
         down = rays[:, 2] < -1e-6
@@ -91,12 +101,13 @@ class Camera:
         color[on_ground] = self._ground_color(origin, rays[on_ground], depth[on_ground])
         rods = hits.rod[on_rod]
         points = origin + rays[on_rod] * depth[on_rod, None]
-        color[on_rod] = self._rod_color(rods, points)
+        color[on_rod] = self._rod_color(rods, points, origin)
         sky = ~on_ground & ~on_rod
-        color[sky] = self._palette.sky(rays[sky, 2] / self._lengths[sky])
+        color[sky] = self._sky_color(rays[sky], self._lengths[sky])
         if self._board is not None:
             on_board = self._board.draw(origin, rays, self.intrinsics.width, depth, color)
             labels[on_board], own[on_board], on_rod[on_board] = 0, False, False
+        color = self._exposed(color, depth, origin, rays, turn, velocity)
         shape = (self.intrinsics.height, self.intrinsics.width)
         rng = np.random.default_rng([self._seed, frame])
         pixel_width = np.full(len(rays), np.inf, np.float32)
@@ -118,15 +129,54 @@ class Camera:
 
     def _ground_color(self, origin: Floats, rays: Floats, depth: Floats) -> Floats:
         x, y = origin[0] + rays[:, 0] * depth, origin[1] + rays[:, 1] * depth
-        return self._palette.ground(x, y, depth)
+        if self._light is None or not self._light.low:
+            return self._palette.ground(x, y, depth)
+        points = np.stack([x, y, np.zeros_like(x)], 1)
+        cosine = self._light.sunlit_ground(self._mesh, points, depth)
+        return self._palette.ground(x, y, depth, self._light.factor(cosine))
 
-    def _rod_color(self, rods: "np.ndarray[tuple[int], np.dtype[np.int32]]", points: Floats) -> Floats:
+    def _sky_color(self, rays: Floats, lengths: Floats) -> Floats:
+        if self._light is None or not self._light.low:
+            return self._palette.sky(rays[:, 2] / lengths)
+        return self._light.sky(self._palette, rays / lengths[:, None])
+
+    def _exposed(
+        self, color: Floats, depth: Floats, origin: Floats, rays: Floats, turn: Floats, velocity: Array | None
+    ) -> Floats:
+        """What motion and lens make of true colours (N×3)."""
+        moves = velocity is not None and self._exposure > 0.0
+        low = self._light is not None and self._light.low
+        if not moves and not low:
+            return color
+        bright = (color / np.float32(255.0)) ** 2
+        if velocity is not None and moves:
+            shape = (self.intrinsics.height, self.intrinsics.width)
+            moved = (self._exposure * velocity.reshape(2, 3)).astype(np.float32) @ turn
+            across = self._rays.reshape(*shape, 3)
+            smeared = blurred(bright.reshape(*shape, 3), depth.reshape(shape), self._focal, across, moved.ravel())
+            bright = smeared.reshape(-1, 3)
+        if self._light is not None and low:
+            self._light.through_lens(bright, rays / self._lengths[:, None], turn[:, 2], origin, self._mesh)
+        shown: Floats = 255.0 * np.sqrt(bright)
+        return shown
+
+    def _rod_color(self, rods: "np.ndarray[tuple[int], np.dtype[np.int32]]", points: Floats, origin: Floats) -> Floats:
         mesh = self._mesh
         offset, axis = points - mesh.start[rods], mesh.axis[rods]
         along = np.einsum("ij,ij->i", offset, axis)
         normal = offset - along[:, None] * axis
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
-        return self._palette.wood(rods, mesh.kind[rods], along, normal)
+        kind, light = mesh.kind[rods], self._light
+        if light is None:
+            return self._palette.wood(rods, kind, along, normal)
+        cosine = light.sunlit(mesh, points, normal)
+        color = self._palette.wood(rods, kind, along, normal, light.factor(cosine) if light.low else None)
+        if light.wet > 0.0:
+            view = origin - points
+            view /= np.linalg.norm(view, axis=1, keepdims=True)
+            wet = self._palette.wet(light.wet, rods, along)
+            light.watered(color, wet, ~np.isin(kind, _TIGHT), cosine, normal, view)
+        return color
 
 
 class InlineRenderer:
@@ -140,13 +190,13 @@ class InlineRenderer:
         self._frame = 0
         self._picture: Picture | None = None
 
-    def expose(self, row: Row, T_world_camera: Array, at: float) -> bool:
+    def expose(self, row: Row, T_world_camera: Array, at: float, velocity: Array) -> bool:
         """Render and encode now."""
         if self._sway > 0.0:
             # The first row that is seen is not cut yet.
             self._wind = self._wind or Wind(row, self._sway, self._seed)
             row = self._wind.blown(row, at)
-        image = self._camera.render(row, T_world_camera, self._frame)
+        image = self._camera.render(row, T_world_camera, self._frame, velocity)
         self._frame += 1
         self._picture = encode_picture(self._camera.intrinsics, image.color, image.depth, image.labels)
         return True

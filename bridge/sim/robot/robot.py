@@ -214,7 +214,12 @@ class SimulatedRobot:
 
     def _expose(self) -> None:
         self._exposure = None
-        self._renderer.expose(self.row, self._site(self._plant.camera), self.time)
+        turning = np.zeros(6)
+        mujoco.mj_objectVelocity(
+            self._plant.model, self._data, mujoco.mjtObj.mjOBJ_SITE, self._plant.camera, turning, 0
+        )
+        # MuJoCo has the angular velocity first.
+        self._renderer.expose(self.row, self._site(self._plant.camera), self.time, np.roll(turning, 3))
 
     def close(self) -> None:
         """Close renderer and trace."""

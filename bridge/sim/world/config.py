@@ -42,6 +42,10 @@ class WorldConfig(Struct, frozen=True, forbid_unknown_fields=True):
         bumps: Height of bumps above the mean ground, from 0.6 to 3 m long.
         sway: Amplitude of canes in the wind, 0.3 m above their base and twice this at the tip, at 0.5 to 2 Hz.
         depth_lost: Fraction of thin wood without depth in each frame, in patches: low sun on active stereo.
+        sunlight: Light of a low sun on a surface that faces it, as a multiple of the sky's; it casts hard shadows.
+        glare: Stray light in the lens, as a multiple of that in the human eye. It needs `sunlight`.
+        wet: Fraction of bark and wires with a film of water: darker, with highlights.
+        exposure: Time of exposure of the colour picture, in which the camera's motion blurs it.
         blade_failures: Fraction of bites through a cane of 8 mm that jam or leave it hanging by its bark. It grows with
             the force that the diameter needs.
         cane_modulus: Young's modulus of canes (GPa), by which they push back and bend; 0 lets them give way to all.
@@ -64,6 +68,10 @@ class WorldConfig(Struct, frozen=True, forbid_unknown_fields=True):
     bumps: Shift = 0.0
     sway: Annotated[float, Meta(ge=0.0, le=0.1)] = 0.0
     depth_lost: Share = 0.0
+    sunlight: Annotated[float, Meta(ge=0.0, le=20.0)] = 0.0
+    glare: Annotated[float, Meta(ge=0.0, le=20.0)] = 0.0
+    wet: Share = 0.0
+    exposure: Annotated[float, Meta(ge=0.0, le=0.1)] = 0.0
     blade_failures: Share = 0.0
     cane_modulus: Annotated[float, Meta(ge=0.0, le=20.0)] = 0.0
     hanging: Share = 0.0
@@ -90,6 +98,10 @@ PRESETS: dict[str, WorldConfig] = {
         bumps=0.010,
         sway=0.005,
         depth_lost=0.2,
+        sunlight=2.0,
+        glare=1.0,
+        wet=0.3,
+        exposure=0.005,
         blade_failures=0.02,
         cane_modulus=6.5,
         hanging=0.1,
@@ -111,6 +123,10 @@ PRESETS: dict[str, WorldConfig] = {
         bumps=0.025,
         sway=0.020,
         depth_lost=0.5,
+        sunlight=5.0,
+        glare=4.0,
+        wet=0.9,
+        exposure=0.015,
         blade_failures=0.10,
         cane_modulus=8.0,
         hanging=0.3,
