@@ -179,6 +179,13 @@ class WorkConfig(Struct, frozen=True, forbid_unknown_fields=True):
         close_up_speed: Largest speed of the tool at the close-up before a cut (m/s).
         close_up_from: Distance of the tool from the cut at the close-up after it (m).
         close_up_timeout_s: Time limit of a close-up (s).
+        servo: Whether pictures on the last way in correct the motion to the cut; needs `pre_cut_check`.
+        servo_rate_hz: Largest rate of these pictures.
+        servo_until: Distance of the tool from the cut where the last one is asked for (m): nearer, the camera measures
+            no depth.
+        servo_max_age_s: Age limit of such a picture when its result comes (s).
+        servo_jump: A cane that is seen farther than this from where it is expected is another one (m).
+        servo_reach: Largest correction (m): what was checked before holds with the blades so far aside.
         search_steps: Iterations of the posture search in 10 ms, distributed over the control periods.
     """
 
@@ -208,6 +215,12 @@ class WorkConfig(Struct, frozen=True, forbid_unknown_fields=True):
     close_up_speed: Annotated[float, at_most(0.5)] = 0.25
     close_up_from: Annotated[float, at_most(0.5)] = 0.15
     close_up_timeout_s: Annotated[float, at_most(20.0)] = 8.0
+    servo: bool = False
+    servo_rate_hz: Annotated[float, Meta(ge=1.0, le=30.0)] = 10.0
+    servo_until: Annotated[float, at_least(0.035, 0.2)] = 0.04
+    servo_max_age_s: Annotated[float, at_most(0.5)] = 0.3
+    servo_jump: Annotated[float, at_most(0.02)] = 0.012
+    servo_reach: Annotated[float, at_most(0.005)] = 0.005
     search_steps: Annotated[int, Meta(ge=1, le=200)] = 10
 
 

@@ -54,6 +54,7 @@ from rolling_panda.messages.perception import (
     CHECK,
     CloseUpRequest,
     CloseUpResult,
+    CutSight,
     Obstacles,
     RobotCalibration,
 )
@@ -300,8 +301,9 @@ class Controller:
         self._supervisor.update(inbox, self._journal.trouble(now, self._config.supervision.ledger_max_age_s), now)
         sequence, bridge, points = self._movement.sequence, self._supervisor.bridge, inbox.newest(m.PruningPoints)
         if bridge is not None:
-            close_up = inbox.newest(CloseUpResult)
-            for ended in sequence.watch(bridge, None if close_up is None else close_up.message, now):
+            close_up, sight = inbox.newest(CloseUpResult), inbox.newest(CutSight)
+            looked = None if close_up is None else close_up.message, None if sight is None else sight.message
+            for ended in sequence.watch(bridge, *looked, now):
                 self._event_log.log(ended)
         if points is not None and points is not self._points_seen:
             self._points_seen = points

@@ -181,6 +181,30 @@ class CloseUpConfig(Struct, frozen=True, forbid_unknown_fields=True):
     node_clearance: Positive = 0.008
 
 
+class SightConfig(Struct, frozen=True, forbid_unknown_fields=True):
+    """Pictures of a cut on the last way to it.
+
+    Attributes:
+        min_distance: Smallest distance of the camera (m): nearer it measures no depth.
+        max_distance: Largest distance of the camera (m).
+        half_window: Half the side of the image window around the cut (m).
+        sure_shift: By so much the cane may be seen aside of where it was seen last, whenever that was (m).
+        max_speed: Largest speed of a swaying cane at the cut (m/s).
+        max_shift: It is never looked for farther from where it was seen last (m).
+        separation: Another cane has to be farther away than the nearest one by this (m).
+        min_alignment: Smallest cosine of the angle between a cane and the one that is followed.
+    """
+
+    min_distance: Positive = 0.19
+    max_distance: Positive = 0.55
+    half_window: Positive = 0.035
+    sure_shift: Positive = 0.005
+    max_speed: Positive = 0.10
+    max_shift: Positive = 0.015
+    separation: Positive = 0.004
+    min_alignment: Positive = 0.85
+
+
 class MaxRadius(Struct, frozen=True, forbid_unknown_fields=True):
     """Largest plausible radius of a post, of a trunk, and of a cordon (m)."""
 
@@ -257,6 +281,7 @@ class PerceptionConfig(Struct, frozen=True, forbid_unknown_fields=True):
         tracker: Pruning points over time.
         obstacles: Obstacles for the arm.
         close_up: Close-up check of one point.
+        sight: Pictures of a cut on the last way to it.
     """
 
     rate_hz: Positive = 20.0
@@ -274,3 +299,4 @@ class PerceptionConfig(Struct, frozen=True, forbid_unknown_fields=True):
     tracker: TrackerConfig = TrackerConfig()
     obstacles: ObstacleConfig = ObstacleConfig()
     close_up: CloseUpConfig = CloseUpConfig()
+    sight: SightConfig = SightConfig()

@@ -16,8 +16,10 @@ from rolling_panda import messages as m
 from rolling_panda import reasons, topics
 from rolling_panda.errors import RollingPandaError
 from rolling_panda.messages.perception import (
+    ON_THE_WAY,
     CameraState,
     CloseUpResult,
+    CutSight,
     Localisation,
     Obstacles,
     RobotCalibration,
@@ -29,6 +31,8 @@ from rolling_panda.transport.runner import Runner, Wire
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
+#: What a picture that was asked for has shown.
+_Look = CloseUpResult | CutSight
 
 #: Least time between log entries about rejected wood (s).
 _REJECTED_PERIOD_S = 60.0
@@ -117,7 +121,7 @@ class PerceptionProcess:
         #: Called when the worker has something to send; it ends the wait for the next step.
         self.wake: Callable[[], None] = lambda: None
         # The controller waits for a close-up check: it is sent before the rest of the frame is processed.
-        self._checks: deque[CloseUpResult] = deque()
+        self._checks: deque[_Look] = deque()
         self._worker: Worker[CameraFrame | Request, _Output] = worker(lambda job: _work(perception, job, self._checked))
         self._newest: _Output | None = None
         self._picture_cycle: dict[tuple[int, int], SpurPicture] = {}
@@ -189,7 +193,7 @@ class PerceptionProcess:
         """Nothing."""
         return ()
 
-    def _checked(self, check: CloseUpResult) -> None:
+    def _checked(self, check: _Look) -> None:
         """Runs on the worker's thread."""
         self._checks.append(check)
         self.wake()
@@ -272,13 +276,17 @@ def perception_runner(wire: Wire, config: PerceptionConfig, perception: Percepti
     return runner
 
 
-def _work(perception: Perception, job: CameraFrame | Request, send: Callable[[CloseUpResult], None]) -> _Output:
+def _work(
+    perception: Perception, job: CameraFrame | Request, send: Callable[[CloseUpResult | CutSight], None]
+) -> _Output:
     reply = None
     if isinstance(job, Request):
         reply = Reply(job, perception.answer(job.message))
         points = perception.points()
     else:
-        if job.point_id:
+        if job.point_id.startswith(ON_THE_WAY):
+            send(perception.see_cut(job))
+        elif job.point_id:
             send(perception.check_close_up(job))
         points = perception.process(job)
     obstacles = Obstacles(header=points.header, capsules=perception.obstacles)

@@ -29,6 +29,7 @@ from perception.segmentation.segmenter import Segmenter
 from perception.skeleton.topology import perceive_plant, trace_canes
 from perception.tracking.camera_rays import CameraRays, Ray
 from perception.tracking.close_up import AROUND, check_close_up, failed_check
+from perception.tracking.cut_sight import CutFollower, unseen
 from perception.tracking.retained_canes import RetainedCanes
 from perception.tracking.spur_pictures import SpurPictures
 from perception.tracking.tracker import Proposal, Tracker, TrackerUpdate
@@ -50,9 +51,11 @@ from rolling_panda.messages.perception import (
     BASE,
     CALIBRATION,
     CHECK,
+    ON_THE_WAY,
     CameraMount,
     Capsule,
     CloseUpResult,
+    CutSight,
     Localisation,
     SpurPicture,
 )
@@ -134,6 +137,7 @@ class Perception:
         self._spur_pictures = SpurPictures()
         self.pictures: tuple[SpurPicture, ...] = ()
         """Pictures of the spurs with a published point, and of the undecided ones."""
+        self._follower = CutFollower(config)
         self._undo: list[_RuleSnapshot] = []
         self._severed: list[Array] = []
         """Positions where wood was found cut."""
@@ -171,8 +175,8 @@ class Perception:
         self.withdrawn = ()
         if self.camera.follow(frame.joint_offsets):
             self._forget()
-        # The calibration's board hides the row.
-        if frame.point_id.startswith((CALIBRATION, BASE, ARM)) or -view.R[2, 1] < self._config.min_upright:
+        # The calibration's board hides the row. On the way to a cut other pictures would come too late.
+        if frame.point_id.startswith((CALIBRATION, BASE, ARM, ON_THE_WAY)) or -view.R[2, 1] < self._config.min_upright:
             return self.points()
         try:
             labels = self.segmenter.segment(view)
@@ -274,9 +278,29 @@ class Perception:
             check = check_close_up(view, self.segmenter, point, frame.number, self._config, known, lift)
         except UnusablePictureError as error:
             return failed_check(frame, error.reason)
+        self._follower.begin(check, point.kind == "renewal cut")
         if check.position is not None and check.tangent is not None:
             self._tracker.refine(point.point_id, np.array(check.position), np.array(check.tangent))
         return self.row_frame.check_in_odom(check)
+
+    def see_cut(self, frame: CameraFrame) -> CutSight:
+        """Find the cut in a picture that was taken on the last way to it; nothing else is looked at, nor changed.
+
+        Args:
+            frame: As received, with `ON_THE_WAY` before the id of the point.
+
+        Raises:
+            CorruptFrameError: The frame is corrupt; nothing changes.
+        """
+        point_id = frame.point_id.removeprefix(ON_THE_WAY)
+        if not self.camera.fits(frame.joint_offsets):
+            self._follower.forget()
+        view = self.row_frame.in_map(decode_frame(frame, self._model))
+        try:
+            sight = self._follower.look(view, self.segmenter, point_id, frame.number)
+        except UnusablePictureError as error:
+            return unseen(view.stamp, point_id, frame.number, error.reason)
+        return self.row_frame.sight_in_odom(sight)
 
     def _locate(self, view: View) -> None:
         """Find where the robot is from a close-up frame: the base has moved since it was known."""

@@ -1961,6 +1961,16 @@ def place_outside_picture() -> None:
 
 
 @_reason("info", "")
+def cut_not_followed() -> None:
+    """No close-up has shown it before."""
+
+
+@_reason("info", "")
+def cane_jumped(aside_mm: float, limit_mm: float) -> None:
+    """The nearest cane was {aside_mm:.0f} mm aside; a cane moves by no more than {limit_mm:.0f} mm in that time."""
+
+
+@_reason("info", "")
 def cane_hidden() -> None:
     """Its cane is hidden."""
 

@@ -122,6 +122,8 @@ _ALL: Final = (
     Limit("real.arm.contact_torque", 20.0, unit="N·m"),
     Limit("controller.work.cut_timeout_s", 3.0),
     Limit("controller.work.close_up_timeout_s", 8.0),
+    Limit("controller.work.servo_rate_hz", 10.0, rate=True),
+    Limit("controller.work.servo_max_age_s", 0.3),
     Limit("lost close-up", 1.5, "controller/work/close_up.py:_LOST_S"),
     Limit("repetition of a close-up request", 0.05, "controller/work/close_up.py:_REPEAT_S"),
     Limit("planner: settling", 0.3, "controller/planning/plan_manager.py:_SETTLED_S"),
@@ -264,6 +266,12 @@ RELATIONS: Final = (
     ),
     Relation(
         "repetition of a close-up request", "lost close-up", "two requests of a close-up may be lost in a row", times=3
+    ),
+    Relation(
+        "controller.work.servo_rate_hz",
+        "controller.work.servo_max_age_s",
+        "a picture on the way in counts while the next one is taken and looked at",
+        times=3,
     ),
     Relation(
         "planner: settling", "planner: pause", "a plan is requested when decisions have settled, also during work"

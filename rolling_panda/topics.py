@@ -188,6 +188,10 @@ CLOSE_UP = Topic(
     "perception/close-up", perception.CloseUpResult, "perception", "controller", 0, "INTERACTIVE_HIGH", "DROP",
     "result of a close-up", express=True,
 )
+CUT_SIGHT = Topic(
+    "perception/cut-sight", perception.CutSight, "perception", "controller", 0, "INTERACTIVE_HIGH", "DROP",
+    "where the cut is, on the last way to it", express=True,
+)
 OBSTACLES = Topic(
     "perception/obstacles", perception.Obstacles, "perception", "controller, server", 1, "DATA_LOW", "DROP",
     "posts, trunks, cordons, wires and retained canes seen so far",
@@ -215,8 +219,8 @@ REPLAY = Topic(
 
 TOPICS: tuple[Topic[Any], ...] = (
     MOTION, TOKEN, CUT, CLOSE_UP_REQUEST, STOP, TELEOP, JOINTS, ODOMETRY, BRIDGE, CONTROLLER, PLAN, REPORT, TIMELINE,
-    PROGRAM, HEARTBEAT, EVENT, CAMERA, PREVIEW, PREVIEW_MOTION, POINTS, PICTURES, CLOSE_UP, OBSTACLES, CAMERA_STATE,
-    LOCALISATION, ROBOT_CALIBRATION, SCENERY, PRESENCE, CONTROL, STOPS, HARDWARE_STOP, REPLAY,
+    PROGRAM, HEARTBEAT, EVENT, CAMERA, PREVIEW, PREVIEW_MOTION, POINTS, PICTURES, CLOSE_UP, CUT_SIGHT, OBSTACLES,
+    CAMERA_STATE, LOCALISATION, ROBOT_CALIBRATION, SCENERY, PRESENCE, CONTROL, STOPS, HARDWARE_STOP, REPLAY,
 )
 #: The topic of each type of message.
 TOPIC_OF: dict[type[Any], Topic[Any]] = {topic.message: topic for topic in TOPICS}

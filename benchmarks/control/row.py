@@ -69,6 +69,7 @@ def cut_row(
     checked: bool = False,
     localise: bool = False,
     supervised: bool = False,
+    servo: bool | None = None,
 ) -> RowRun:
     """Survey from the start posture, accept up to `points` of what was detected, work through them.
 
@@ -87,6 +88,7 @@ def cut_row(
         checked: The camera is checked first, and a correction that is offered is used.
         localise: Perception corrects the odometry by the wood that it has seen.
         supervised: A played person lets the work go on after a stop, at most a few times.
+        servo: Whether the motion is corrected on the last way to a cut; None as configured.
         world: Disturbances. Where `odom` drifts, `distance`, `tool_error` and `path_rms` are no truth.
     """
     errors: list[float] = []
@@ -102,7 +104,10 @@ def cut_row(
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "trace"
-        config = sim_config(Path(folder) / "row.toml", pictures, world, {"perception": {"localise": localise}})
+        settings: dict[str, dict[str, object]] = {"perception": {"localise": localise}}
+        if servo is not None:
+            settings["controller.work"] = {"servo": servo}
+        config = sim_config(Path(folder) / "row.toml", pictures, world, settings)
         with ClosedLoop(seed, path, config, method, watch, plans, looks, segmenter) as loop:
             touches, wanted = CaneTouches(staying_rods(row_of(loop))), wanted_cuts(row_of(loop))
             warned = _check_camera(loop) if checked else ""
@@ -189,6 +194,7 @@ def judged_cuts(
                 right_cane=truth.right_cane,
                 nodes_left=truth.nodes_left,
                 past_best=truth.past_best,
+                aside=None if bite is None or bite["nearest"] is None else math.hypot(*bite["nearest"]),
             )
         )
     return tuple(cuts)

@@ -30,6 +30,8 @@ class Cut:
         right_cane: Wood that is to be cut was cut.
         nodes_left: Count nodes left on the cane that stays, where it was cut.
         past_best: Along the wood, from where the rule puts the blades to where they cut (m).
+        aside: Across the wood, from the middle of the blades to the nearest wood as they closed (m); None when they
+            did not, or none was near.
     """
 
     method: str
@@ -45,6 +47,7 @@ class Cut:
     right_cane: bool = False
     nodes_left: int | None = None
     past_best: float | None = None
+    aside: float | None = None
 
     @property
     def bitten(self) -> bool:

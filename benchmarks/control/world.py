@@ -98,6 +98,8 @@ def summarise(runs: Sequence[RowRun]) -> dict[str, Figure]:
         "asked_of_person": share(sum(cut.state == "UNKNOWN" for cut in bitten), len(bitten)),
         "from_best_m_median": quantile(past, 0.5),
         "from_best_m_p95": quantile(past, 0.95),
+        "aside_m_median": quantile([cut.aside for cut in made if cut.aside is not None], 0.5),
+        "aside_m_p95": quantile([cut.aside for cut in made if cut.aside is not None], 0.95),
         "rows_with_contact": share(sum(run.contacts + run.self_contacts > 0 for run in runs), len(runs)),
         "rows_stopped": share(sum(run.stops > 0 for run in runs), len(runs)),
     }
@@ -157,6 +159,9 @@ def main(argv: Sequence[str]) -> int:
     parser.add_argument(
         "--supervised", action="store_true", help="with a played person who lets the work go on after a stop"
     )
+    servo = parser.add_mutually_exclusive_group()
+    servo.add_argument("--servo", action="store_true", help="correct the motion on the last way to a cut")
+    servo.add_argument("--no-servo", action="store_true", help="do not, whatever is configured")
     parser.add_argument("--segmenter", default="", choices=SEGMENTERS, help="in place of the configured one")
     words = parser.parse_args(argv)
     if words.each and words.knob:
@@ -177,6 +182,7 @@ def main(argv: Sequence[str]) -> int:
                 checked=words.check_camera,
                 localise=words.localise,
                 supervised=words.supervised,
+                servo=True if words.servo else False if words.no_servo else None,
             )
             runs.append(run)
             results += [{"disturbance": case.name, "level": case.level, **asdict(cut)} for cut in run.cuts]
@@ -213,6 +219,7 @@ def main(argv: Sequence[str]) -> int:
                 "camera_checked": words.check_camera,
                 "localise": words.localise,
                 "supervised": words.supervised,
+                "servo": "on" if words.servo else "off" if words.no_servo else "as configured",
                 "rows": words.count,
                 "first_seed": words.seed,
                 "summary": summary,

@@ -342,6 +342,11 @@ class ToolMotion:
         return self.time >= self.duration
 
     @property
+    def correcting(self) -> bool:
+        """Whether the last shift of the goal is still being made."""
+        return bool(self._corrections) and self.time < self._corrections[-1].end
+
+    @property
     def leg(self) -> int:
         """Number of the leg that has begun last."""
         return max(i for i, leg in enumerate(self._legs) if i == 0 or self.time >= leg.begin)

@@ -28,7 +28,7 @@ from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.config import RobotConfig
 from rolling_panda.errors import ControlError
-from rolling_panda.messages.perception import CloseUpResult, Obstacles
+from rolling_panda.messages.perception import ON_THE_WAY, CloseUpResult, Obstacles
 from rolling_panda.messages.supervision import PreviewedCut, PreviewRow
 from rolling_panda.mode_table import Event
 from rolling_panda.model.differential_drive import NXI, Array, DifferentialDrive
@@ -135,14 +135,14 @@ class _Run:
         self._journal.observe(LedgerState(self._journal.number), now)
         movement.update(inbox)
         close_up = inbox.newest(CloseUpResult)
-        sequence.watch(bridge, None if close_up is None else close_up.message, now)
+        sequence.watch(bridge, None if close_up is None else close_up.message, None, now)
         moved = movement.step("AUTO", True, now)
         command = movement.send(moved.xi, _TOKEN, inbox.newest(m.JointState), latched=False)
         if moved.cut is not None and (self._closing is None or self._closing[0] != moved.cut[0]):
             self._closing = (*moved.cut, now)
             self._log.closed(moved.cut[1], now)
         due = sequence.picture(now)
-        if due is not None and due[0] not in self._asked:
+        if due is not None and due[0] not in self._asked and not due[1].startswith(ON_THE_WAY):
             # Two points can be due at the same time: that of the previous cut and the next one.
             self._asked.add(due[0])
             self._pending.append((now + self._request.close_up_s, self._shown(*due)))

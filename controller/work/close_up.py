@@ -91,6 +91,13 @@ class CloseUpClient:
                 return asked.number, point_id
         return None
 
+    def number(self) -> int | None:
+        """Number for a picture that is no close-up; None while a close-up is pending, which it would overtake."""
+        if any(asked.answer is None for asked in self._asked.values()):
+            return None
+        self._number += 1
+        return self._number
+
     def answer(self, point_id: str, now: float) -> CloseUpResult | None:
         """The result for a point; None while it is pending, and where none was requested."""
         asked = self._asked.get(point_id)

@@ -30,12 +30,13 @@ from controller.work.close_up import CloseUpClient, PostCutCheck, camera_ready, 
 from controller.work.homing import Withdrawal
 from controller.work.point_queue import TOLD_MOVED, PointQueue
 from controller.work.posture_search import CutPlan, Known, NextCut, Permit, PostureSearch, Unreachable, escape_pose
+from controller.work.servo import CutServo
 from controller.work.step_result import StepResult
 from controller.work.survey import Survey
 from controller.work.tries import Tried
 from rolling_panda import messages as m
 from rolling_panda import reasons
-from rolling_panda.messages.perception import CloseUpResult
+from rolling_panda.messages.perception import ON_THE_WAY, CloseUpResult, CutSight
 from rolling_panda.messages.types import Reason
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.map_frame import MapFrame
@@ -191,6 +192,7 @@ class Parts:
         queue: The queue of points.
         segments: Segments of the motion to a cut and out again.
         close_ups: Client for pictures.
+        servo: Corrects the motion to a cut by pictures on the way.
         post_cut_check: Check of the last cuts.
         blades: Orders the cuts.
         next_cut: Posture search for the next point.
@@ -208,6 +210,7 @@ class Parts:
     queue: PointQueue
     segments: ApproachSegments
     close_ups: CloseUpClient
+    servo: CutServo
     post_cut_check: PostCutCheck
     blades: Blades
     next_cut: NextCut
@@ -628,6 +631,7 @@ class CloseUp(MovingStage):
         position, accepted = np.array(close_up.position), self._task.accepted
         motion.extend(parts.segments.into(self._task.plan))
         _shift(motion, position)
+        parts.servo.begin(self.point_id, motion.goal)
         self._way.timeout.start(motion.duration)
         known = None if accepted is None else robot.frame.position_in_odom(np.array(accepted.position))
         moved = 0.0 if known is None else math.dist(position, known)
@@ -653,7 +657,9 @@ class Advance(MovingStage):
         if left or parts.ending:
             stage, result = self._retreat(robot).step(robot, now)
             return stage, result.with_event(left) if left else result
-        if not config.work.pre_cut_check:
+        if config.work.pre_cut_check:
+            parts.servo.correct(motion, robot)
+        else:
             parts.refine(self.point_id, motion, robot.frame)
         tracking = self._way.track(robot)
         result = StepResult(tracking.xi, tracking)
@@ -835,6 +841,7 @@ class CutSequence:
             queue,
             ApproachSegments(config.work, follower.flows),
             close_ups,
+            CutServo(config.work),
             check,
             Blades(config.work, queue, run_id, check.start),
             NextCut(search, queue, config.search_steps_each, known, permit),
@@ -932,16 +939,32 @@ class CutSequence:
         """Abort the work. A cut in progress is still monitored, and an accepted point stays accepted."""
         self._stage = Rest(self._parts)
 
-    def watch(self, bridge: m.BridgeState, close_up: CloseUpResult | None, now: float) -> tuple[m.Reason, ...]:
-        """Process the end of a cut and the newest close-up, in every mode; returns what is logged."""
+    def watch(
+        self, bridge: m.BridgeState, close_up: CloseUpResult | None, sight: CutSight | None, now: float
+    ) -> tuple[m.Reason, ...]:
+        """Process the end of a cut and the newest pictures, in every mode; returns what is logged.
+
+        Args:
+            bridge: State of the bridge.
+            close_up: Result of the newest close-up.
+            sight: What the newest picture on the way to a cut shows.
+            now: Monotonic time (s).
+        """
         parts = self._parts
+        if sight is not None:
+            parts.servo.update(sight, now)
         if close_up is not None:
             parts.close_ups.update(close_up, now)
         return *parts.blades.watch(bridge, now), *parts.post_cut_check.step(now)
 
     def picture(self, now: float) -> tuple[int, str] | None:
         """Number and point of the picture to ask for in this period; None when none is due."""
-        return self._parts.close_ups.due(now)
+        close_ups, servo = self._parts.close_ups, self._parts.servo
+        due = close_ups.due(now)
+        if due is None and isinstance(self._stage, Advance) and servo.due(now) and (number := close_ups.number()):
+            servo.asked(number, now)
+            due = number, f"{ON_THE_WAY}{servo.point_id}"
+        return due
 
     @property
     def may_give_way(self) -> bool:

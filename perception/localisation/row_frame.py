@@ -19,7 +19,7 @@ from perception.segmentation.frame import View
 from perception.tracking.camera_rays import Ray
 from rolling_panda import messages as m
 from rolling_panda import reasons
-from rolling_panda.messages.perception import CloseUpResult, Localisation
+from rolling_panda.messages.perception import CloseUpResult, CutSight, Localisation
 from rolling_panda.messages.types import Vector3
 from rolling_panda.model.robot import pose_message
 from rolling_panda.model.wire_values import vector3
@@ -154,6 +154,12 @@ class RowFrame:
         if self._T is None or check.position is None or check.tangent is None:
             return check
         return replace_message(check, position=self._place(check.position), tangent=self._direction(check.tangent))
+
+    def sight_in_odom(self, sight: CutSight) -> CutSight:
+        """The same of a picture on the way to a cut; the transform is nearly level, and leaves the covariance."""
+        if self._T is None or sight.position is None:
+            return sight
+        return replace_message(sight, position=self._place(sight.position))
 
     def _place(self, position: Vector3) -> Vector3:
         assert self._T is not None

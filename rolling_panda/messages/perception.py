@@ -257,6 +257,31 @@ class CloseUpResult(Message, frozen=True, kw_only=True):
     nodes: tuple[Finite, ...] = ()
 
 
+#: `point_id` of a picture on the way to a cut is this with the id of the point.
+ON_THE_WAY: Final = "way:"
+
+
+class CutSight(Message, frozen=True, kw_only=True):
+    """Perception → controller: where the cut is in a picture that was taken on the last way to it.
+
+    Attributes:
+        header: Stamp of the camera frame; `frame_id` is odom.
+        point_id: The point.
+        number: `number` of the request.
+        reason: Why the picture does not tell; None where it does.
+        position: Where the cane crosses the plane square to it in which the close-up saw the cut, in odom (m); None
+            where the picture does not tell. It says nothing about the place along the cane.
+        covariance: Of the position (m²): xx, xy, xz, yy, yz, zz; without what is wrong in all pictures alike.
+    """
+
+    header: Header
+    point_id: Name
+    number: Count
+    reason: Reason | None = None
+    position: Vector3 | None = None
+    covariance: Covariance | None = None
+
+
 class Localisation(Message, frozen=True, kw_only=True):
     """Perception → controller: where the robot is in the row.
 

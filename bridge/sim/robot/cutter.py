@@ -136,6 +136,19 @@ def close_blades(row: Row, T_world_tool: Array, config: BridgeConfig) -> CutResu
     return CutResult(severed, False, reasons.wood_severed(", ".join(item.rod.kind for item in severed)))
 
 
+def wood_in_plane(row: Row, T_world_tool: Array) -> Array:
+    """Where soft wood crosses the blade plane (N×2, m): the tool's x and z, the nearest to its origin first."""
+    soft = [rod for _, rod in row.standing() if rod.kind in _SOFT]
+    if not soft:
+        return np.zeros((0, 2))
+    R, p = T_world_tool[:3, :3], T_world_tool[:3, 3]
+    starts, ends = ((np.array(each) - p) @ R for each in zip(*((rod.start, rod.end) for rod in soft), strict=True))
+    fraction = _plane_crossing(starts, ends)
+    at = (starts + np.nan_to_num(fraction)[:, None] * (ends - starts))[~np.isnan(fraction)][:, [0, 2]]
+    nearest_first: Array = at[np.argsort(np.linalg.norm(at, axis=1), kind="stable")]
+    return nearest_first
+
+
 def _plane_crossing(starts: Array, ends: Array) -> Array:
     """Fraction 0…1 at which each rod's axis crosses y = 0; NaN where it does not."""
     rise = ends[:, 1] - starts[:, 1]

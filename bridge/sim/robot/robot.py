@@ -21,7 +21,7 @@ from bridge.config import BridgeConfig
 from bridge.core.interface import Measurement, Setpoint
 from bridge.core.picture import Picture
 from bridge.sim.camera.render_process import CameraRenderer
-from bridge.sim.robot.cutter import CutResult, Cutter, close_blades
+from bridge.sim.robot.cutter import CutResult, Cutter, close_blades, wood_in_plane
 from bridge.sim.robot.model import STEP_S, build_plant
 from bridge.sim.robot.touch import ExternalTorque, touching_spheres
 from bridge.sim.robot.trace import CUTTER, TraceWriter
@@ -378,19 +378,24 @@ class SimulatedRobot:
 
     def _close_blades(self, setpoint: Setpoint) -> None:
         tool = self.true_tool()
+        nearest = wood_in_plane(self._blown(tool), tool)[:1].tolist()
         result = self._bite(tool)
         self.row = result.applied(self.row, self._wood.hangs() if result.severed else None)
         # Blades that met say so, also when the wood hangs by its bark.
         done = bool(result.severed) or result.detail == reasons.blades_met()
         self._cutter.finish("DONE" if done else "FAILED_NOT_CUT", result.detail, result.jammed)
         if self._trace is not None:
-            self._trace.event(self._cut_event(result, tool, setpoint))
+            self._trace.event({**self._cut_event(result, tool, setpoint), "nearest": nearest[0] if nearest else None})
+
+    def _blown(self, tool: Array) -> Row:
+        """The row with the wood near the blades where the wind has it now."""
+        if self._wind is None:
+            return self.row
+        near = {index for index, rod in self.row.standing() if np.linalg.norm(rod.start - tool[:3, 3]) < _NEAR_BLADES}
+        return self._wind.blown(self.row, self.time, near)
 
     def _bite(self, tool: Array) -> CutResult:
-        row, standing = self.row, self.row
-        if self._wind is not None:
-            near = {index for index, rod in row.standing() if np.linalg.norm(rod.start - tool[:3, 3]) < _NEAR_BLADES}
-            standing = self._wind.blown(row, self.time, near)
+        row, standing = self.row, self._blown(tool)
         result = close_blades(standing, tool, self._config)
         thickest = max((2.0 * item.rod.at(item.along)[1] for item in result.severed), default=0.0)
         if result.severed and self._wood.fails(thickest):

@@ -18,7 +18,7 @@ from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.closing import Closing
 from rolling_panda.config import RobotConfig, load_section
-from rolling_panda.messages.perception import BASE, Obstacles
+from rolling_panda.messages.perception import BASE, ON_THE_WAY, Obstacles
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.messages.supervision import Person, Presence, SessionPlan
 from rolling_panda.model.differential_drive import Array
@@ -30,8 +30,8 @@ from tests.support.worlds.world import RobotWorld
 
 # A frame takes perception about this long, so its points come later by as much.
 _PERCEPTION_S = 0.15
-# A closer look is at a part of a frame, and comes before the rest of it.
-_LOOK_S = 0.08
+# A closer look is at a part of a frame, and comes before the rest of it. On the way to a cut it is all.
+_LOOK_S, _SIGHT_S = 0.08, 0.04
 # Period of perception's loop.
 _PERCEPTION_PERIOD_S = 0.01
 
@@ -44,6 +44,7 @@ class PerceptionInTime:
         self._perception = perception
         self._frame: Received[CameraFrame] | None = None
         self._made: deque[tuple[float, m.Message]] = deque()
+        self._busy_until = 0.0
         self._beats = 0
 
     def step(self, inbox: Inbox, now: float) -> list[object]:
@@ -51,6 +52,11 @@ class PerceptionInTime:
         frame = inbox.newest(CameraFrame)
         if frame is not None and frame is not self._frame:
             self._frame = frame
+            if frame.message.point_id.startswith(ON_THE_WAY):
+                self._busy_until = max(now, self._busy_until) + _SIGHT_S
+                self._made.append((self._busy_until, self._perception.see_cut(frame.message)))
+                return self._due(now)
+            self._busy_until = now + _PERCEPTION_S
             if frame.message.point_id:
                 self._made.append((now + _LOOK_S, self._perception.check_close_up(frame.message)))
             points = self._perception.process(frame.message)
@@ -59,6 +65,9 @@ class PerceptionInTime:
                 self._made.append((now + _PERCEPTION_S, message))
             if frame.message.point_id.startswith(BASE):
                 self._made.append((now + _PERCEPTION_S, self._perception.calibrator.state))
+        return self._due(now)
+
+    def _due(self, now: float) -> list[object]:
         self._beats += 1
         out: list[object] = [m.Heartbeat(process="perception", sequence=self._beats)]
         out += [message for due, message in self._made if now >= due]

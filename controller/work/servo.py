@@ -1,0 +1,108 @@
+"""Servoing on the last way in: the motion to a cut is corrected to where its cane is seen on the way.
+
+The pictures on the way are averaged with the close-up before it, each by how much it may be wrong. A cane that sways is
+seen now on one side, now on the other: their mean is where it is most likely when the blades close. A correction is
+square to the cane. It is bounded by `servo_reach`, so that the blades stay where the margin of the checks has them, and
+by the speed of the last part. Without pictures, and with those that tell nothing or come late, the motion stays as it
+is.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from controller.config import WorkConfig
+from controller.motion.follower import Measured
+from controller.motion.tool_motion import ToolMotion
+from rolling_panda.messages.perception import CutSight
+
+#: SD of where the close-up has a cane, sway included (m).
+_BEFORE = 0.003
+#: SD of the angle by which the camera is turned wrongly (rad): what it sees far away is off by more.
+_TURNED = 0.006
+#: SD of the time between a picture and the posture that is told with it (s): the tool moves meanwhile.
+_LATE = 0.010
+#: Distance of the camera from the middle of the blades (m).
+_CAMERA = 0.155
+#: Smaller corrections are left (m).
+_LEAST = 0.0005
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """A picture that was asked for: when (s), and how far from the cut (m) and how fast (m/s) the tool was."""
+
+    at: float
+    away: float
+    speed: float
+
+
+class CutServo:
+    """What the pictures on the way to one cut have shown. Pure: time is an argument."""
+
+    def __init__(self, config: WorkConfig) -> None:
+        """Bind the configuration; nothing is followed."""
+        self._config = config
+        self.end()
+
+    def begin(self, point_id: str, goal: Any) -> None:
+        """Follow a point.
+
+        Args:
+            point_id: The point.
+            goal: T_odom_tool (pin.SE3) at the cut, where the close-up has seen it.
+        """
+        self.point_id = point_id if self._config.servo else ""
+        self._goal, self._across = goal.translation.copy(), goal.rotation[:, [0, 2]].copy()
+        self._aside, self._variance, self._made = np.zeros(2), np.full(2, _BEFORE**2), np.zeros(2)
+        self._asked: dict[int, _Asked] = {}
+        self._away, self._speed, self._next = 0.0, 0.0, -math.inf
+
+    def end(self) -> None:
+        """Follow nothing."""
+        self.begin("", pin.SE3.Identity())
+
+    def due(self, now: float) -> bool:
+        """Whether to ask for the next picture."""
+        return bool(self.point_id) and self._away > self._config.servo_until and now >= self._next
+
+    def asked(self, number: int, now: float) -> None:
+        """A picture was asked for."""
+        self._asked[number] = _Asked(now, self._away, self._speed)
+        self._next = now + 1.0 / self._config.servo_rate_hz
+
+    def update(self, sight: CutSight, now: float) -> None:
+        """Take in what a picture has shown. One that tells nothing, tells of a jump or is too old changes nothing."""
+        asked = self._asked.pop(sight.number, None)
+        if asked is None or sight.point_id != self.point_id or sight.position is None or sight.covariance is None:
+            return
+        if now - asked.at > self._config.servo_max_age_s:
+            return
+        seen = (np.array(sight.position) - self._goal) @ self._across
+        if float(np.linalg.norm(seen - self._aside)) > self._config.servo_jump:
+            return
+        xx, xy, xz, yy, yz, zz = sight.covariance
+        noise = self._across.T @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ self._across
+        variance = np.diag(noise) + (_TURNED * (asked.away + _CAMERA)) ** 2
+        # The second axis is that of the approach.
+        variance += [0.0, (_LATE * asked.speed) ** 2]
+        gain = self._variance / (self._variance + variance)
+        self._aside = self._aside + gain * (seen - self._aside)
+        self._variance = (1.0 - gain) * self._variance
+
+    def correct(self, motion: ToolMotion, robot: Measured) -> None:
+        """Lead the rest of the motion to the present estimate, one correction after the other."""
+        if not self.point_id:
+            return
+        self._away = math.dist(robot.kinematics.T_odom_tool.translation, motion.goal.translation)
+        self._speed = float(np.linalg.norm(robot.kinematics.J_xi[:3] @ robot.sent))
+        if motion.correcting:
+            return
+        length = float(np.linalg.norm(self._aside))
+        wanted = self._aside * min(1.0, self._config.servo_reach / max(length, 1e-9))
+        if float(np.linalg.norm(wanted - self._made)) >= _LEAST:
+            motion.shift(self._across @ (wanted - self._made))
+            self._made = wanted
