@@ -271,7 +271,7 @@ RELATIONS: Final = (
         "controller.work.servo_rate_hz",
         "controller.work.servo_max_age_s",
         "a picture on the way in counts while the next one is taken and looked at",
-        times=3,
+        times=2,
     ),
     Relation(
         "planner: settling", "planner: pause", "a plan is requested when decisions have settled, also during work"

@@ -1,10 +1,10 @@
-"""Servoing on the last way in: the motion to a cut is corrected to where its cane is seen on the way.
+"""Servoing on the last way in: the motion to a cut is corrected to where pictures on the way show its cane.
 
-The pictures on the way are averaged with the close-up before it, each by how much it may be wrong. A cane that sways is
-seen now on one side, now on the other: their mean is where it is most likely when the blades close. A correction is
-square to the cane. It is bounded by `servo_reach`, so that the blades stay where the margin of the checks has them, and
-by the speed of the last part. Without pictures, and with those that tell nothing or come late, the motion stays as it
-is.
+The pictures are averaged with the close-up before them, each by how much it may be wrong. The camera measures no depth
+from nearer than 0.18 m, so that the last one is taken about a second before the blades have closed: a cane that sways
+is then anywhere on its way, and most likely near the mean of where it was seen. A correction is square to the cane. It
+is bounded by `servo_reach`, so that the blades stay within the margin of what was checked before, and by the speed of
+the last part. Without pictures, and with those that tell nothing or come late, the motion stays as it is.
 """
 
 import math
