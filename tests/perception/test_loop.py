@@ -14,9 +14,11 @@ from rolling_panda import reasons
 from rolling_panda.commands import SetRule
 from rolling_panda.errors import RollingPandaError
 from rolling_panda.messages.perception import (
+    ON_THE_WAY,
     CameraState,
     Capsule,
     CloseUpResult,
+    CutSight,
     RobotCalibration,
     SpurDrawing,
     SpurPicture,
@@ -27,6 +29,7 @@ from rolling_panda.topics import (
     CAMERA,
     CAMERA_STATE,
     CLOSE_UP,
+    CUT_SIGHT,
     EVENT,
     HEARTBEAT,
     LOCALISATION,
@@ -89,6 +92,10 @@ class FakePerception:
 
     def check_close_up(self, frame):
         return CloseUpResult(header=m.Header(), point_id=frame.point_id, number=1, finding="unseen")
+
+    def see_cut(self, frame):
+        point_id = frame.point_id.removeprefix(ON_THE_WAY)
+        return CutSight(header=m.Header(), point_id=point_id, number=1, reason=reasons.no_cane_at_place())
 
     def points(self):
         return m.PruningPoints(header=m.Header(), segmenter="s", frames=7, points=())
@@ -367,3 +374,12 @@ def test_a_frame_that_is_never_worked_on_can_be_clicked_all_the_same(parts):
     loop.step(0.4)
     assert noted == ["hang", "shown", "newer"]
     perception.release.set()
+
+
+def test_a_picture_on_the_way_to_a_cut_is_answered_at_once_and_is_no_close_up(parts):
+    wire, _, loop = parts
+    loop.see("good", point_id=f"{ON_THE_WAY}p3")
+    loop.step(0.0)
+    assert loop.woken.wait(5.0)
+    loop.step(0.05)
+    assert [sight.point_id for sight in wire.sent[CUT_SIGHT.name]] == ["p3"] and not wire.sent[CLOSE_UP.name]
