@@ -13,6 +13,7 @@ BENCHMARKS = {
     "tick": ("benchmarks.control.tick", "time of one control step"),
     "row": ("benchmarks.control.row", "cuts in simulated rows, end to end"),
     "world": ("benchmarks.control.world", "the same in a rough world: calibration, ground, wind, light, blades"),
+    "servo": ("benchmarks.control.servo", "pictures on the last way to a cut, and where the blades close"),
     "vine": (
         "benchmarks.control.vine",
         "a whole vine with a reviewer: seconds of machine and person, every cut judged",

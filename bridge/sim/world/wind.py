@@ -38,7 +38,7 @@ class Wind:
                 canes[cane] = float(rng.uniform(*_FREQUENCIES)), float(rng.uniform(0.0, math.tau))
             base = beyond.get(rod.parent, 0.0)
             beyond[index] = base + float(np.linalg.norm(rod.end - rod.start))
-            self._reach[index] = (_bend(base), _bend(beyond[index]), *canes[cane])
+            self._reach[index] = (bend(base), bend(beyond[index]), *canes[cane])
 
     def blown(self, row: Row, at: float, near: Collection[int] | None = None) -> Row:
         """The row at a time (s); only rods `near` are moved where given."""
@@ -57,7 +57,7 @@ class Wind:
         return replace(rod, start=rod.start + first * push, end=rod.end + last * push)
 
 
-def _bend(along: float) -> float:
+def bend(along: float) -> float:
     """Share of the amplitude at a length along the cane: like a beam near its base, at most 2."""
     ratio = (along / _AT) ** 2
     return 2.0 * ratio / (1.0 + ratio)
