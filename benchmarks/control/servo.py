@@ -163,11 +163,6 @@ class SeeingRobot(KinematicRobot):
         else:
             self._exposures.append(asked)
 
-    def hear(self, message: object) -> None:
-        """A message arrives; a picture is answered later."""
-        if message is not None:
-            super().hear(message)
-
     def step(self) -> list[object]:
         """One period, in which pictures are exposed and answered."""
         due = [each for each in self._exposures if each[0] <= self.now]
@@ -176,7 +171,7 @@ class SeeingRobot(KinematicRobot):
             self._expose(*each)
         for at, answer in self._answers:
             if at <= self.now:
-                super().hear(answer)
+                self.hear(answer)
         self._answers = [each for each in self._answers if each[0] > self.now]
         return super().step()
 

@@ -62,16 +62,12 @@ class Watching(KinematicRobot):
         self._seen.append((self.now + self.late_s, sight))
         return None
 
-    def hear(self, message) -> None:
-        if message is not None:
-            super().hear(message)
-
     def tool(self) -> np.ndarray:
         return self.model.kinematics(self.q).T_odom_tool.translation.copy()
 
     def step(self):
         while self._seen and self._seen[0][0] <= self.now:
-            super().hear(self._seen.pop(0)[1])
+            self.hear(self._seen.pop(0)[1])
         self.tools.append(self.tool())
         out = super().step()
         if self.cuts and self.ordered_at is None:

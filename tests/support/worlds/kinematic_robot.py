@@ -144,7 +144,8 @@ class KinematicRobot:
                 case m.TokenRequest():
                     self._fence.claim(message.token, self.now, not self._moving)
                 case CloseUpRequest():
-                    self.hear(self.close_up(message))
+                    if (seen := self.close_up(message)) is not None:
+                        self.hear(seen)
                 case m.CutCommand() if message.cut_id != self._cut_id:
                     self._cut_id, self._cut_at = message.cut_id, self.now
                     place = self.model.kinematics(self.q).T_odom_tool.homogeneous.copy()
@@ -184,8 +185,11 @@ class KinematicRobot:
         for _ in range(round(seconds / self.dt)):
             self.step()
 
-    def close_up(self, request: CloseUpRequest) -> CloseUpResult:
-        """A camera that always sees the point: where it was shown, and off once its cut is done."""
+    def close_up(self, request: CloseUpRequest) -> CloseUpResult | None:
+        """A camera that always sees the point: where it was shown, and off once its cut is done.
+
+        Pictures on the way to a cut show nothing; None is for an answer that comes later.
+        """
         point = next((each for each in self._shown if each.point_id == request.point_id), None)
         off = self.outcome == "DONE" and any(cut[0] == request.point_id for cut in self.cuts)
         return CloseUpResult(
