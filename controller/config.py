@@ -216,7 +216,7 @@ class WorkConfig(Struct, frozen=True, forbid_unknown_fields=True):
     close_up_from: Annotated[float, at_most(0.5)] = 0.15
     close_up_timeout_s: Annotated[float, at_most(20.0)] = 8.0
     servo: bool = False
-    servo_rate_hz: Annotated[float, Meta(ge=4.0, le=30.0)] = 10.0
+    servo_rate_hz: Annotated[float, within(4.0, 30.0)] = 10.0
     servo_until: Annotated[float, within(0.035, 0.2)] = 0.04
     servo_max_age_s: Annotated[float, at_most(0.5)] = 0.3
     servo_jump: Annotated[float, at_most(0.02)] = 0.015

@@ -73,7 +73,7 @@ def test_minutes_of_work_for_a_stop_are_told_beside_the_times_a_person_came() ->
 def test_what_was_run_is_on_disk_and_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     worlds: list[tuple[int, WorldConfig]] = []
 
-    def worked_off(seed, points, method, pictures, segmenter, world, checked, localise, supervised):
+    def worked_off(seed, points, method, pictures, segmenter, world, checked, localise, supervised, servo):
         worlds.append((seed, world))
         return run() if world.depth_lost == PRESETS["storm"].depth_lost else run(cut(), cut(right=world == CALM))
 

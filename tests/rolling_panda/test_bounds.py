@@ -51,7 +51,7 @@ HARMLESS = {
     "odometry.linear_noise odometry.angular_noise",
     "real": "arm.load_mass arm.load_inertia camera.enabled camera.width camera.height camera.rate_hz",
     "robot": "rho",
-    "controller": "work.row_heading work.search_steps motion.blend motion.base_lag_s motion.arm_lag_s "
+    "controller": "work.row_heading work.search_steps work.servo motion.blend motion.base_lag_s motion.arm_lag_s "
     "motion.gain_position motion.gain_rotation whole_body.gain_posture whole_body.gain_heading "
     "whole_body.gain_manipulability whole_body.gain_limits whole_body.damping whole_body.hierarchy.base_heading "
     "whole_body.hierarchy.base_place whole_body.hierarchy.arm_posture whole_body.hierarchy.manipulability "
