@@ -283,6 +283,7 @@ def main(argv: Sequence[str]) -> int:
     parser.add_argument("--count", type=int, default=20, help="rows of pictures, or cuts in each world (default: 20)")
     parser.add_argument("--pictures", action="store_true", help="rendered pictures alone")
     parser.add_argument("--cuts", action="store_true", help="cuts alone")
+    parser.add_argument("--world", action="append", choices=tuple(WORLDS), help="may be given several times; all")
     parser.add_argument("--segmenter", default="network", choices=SEGMENTERS, help="of the pictures")
     words = parser.parse_args(argv)
     seeds, document = range(words.seed, words.seed + words.count), dict[str, Any]()
@@ -300,6 +301,8 @@ def main(argv: Sequence[str]) -> int:
         document["pictures"] = [asdict(each) for each in found]
     if not words.pictures:
         for name, world in WORLDS.items():
+            if words.world and name not in words.world:
+                continue
             both = [(close_blades(seed, world, False), close_blades(seed, world, True)) for seed in seeds]
             pairs = [(a, b) for a, b in both if a is not None and b is not None]
             if pairs:
