@@ -110,6 +110,7 @@ class Controller:
             method,
             permit,
             self._plans.made_from,
+            lambda: self._previews.binds,
         )
         self._postures = Postures(config.work, self._movement.body, self._movement.posture_check, self._journal)
         self._supervisor = Supervisor(config.supervision, self._movement, self._event_log, draw)

@@ -19,7 +19,7 @@ P = ParamSpec("P")
 Severity = Literal["info", "warning", "error"]
 # Values that are words: the page has a text of each, `name.…` of `web/text/page.en.json`.
 Goal = Literal["the cut", "the stand-off", "the way back", "a place clear of the canes"]
-Place = Literal["at the cut", "at the stand-off", "clear of it"]
+Place = Literal["at the cut", "on the way in", "at the stand-off", "clear of it"]
 
 
 @dataclass(frozen=True)
@@ -2817,6 +2817,16 @@ def tracking_error(part: str, error_rad: float, limit_rad: float) -> None:
 @_reason("warning", "move the point along its cane, or cut this one by hand")
 def no_clear_posture(near: Reason) -> None:
     """Every posture that reaches it comes too near to an obstacle; in the best one: {near}."""
+
+
+@_reason("warning", "move the point along its cane, or cut this one by hand")
+def no_room_where_seen(near: Reason) -> None:
+    """No approach has room where the close-up sees the cut: {near}."""
+
+
+@_reason("info", "")
+def turned_where_seen(point: str, near: Reason) -> None:
+    """{point} is approached another way, for where the close-up sees it: {near}."""
 
 
 @_reason("warning", "")

@@ -44,9 +44,7 @@ class CutPlanner:
             RobotModel(robot_config),
             config.work,
             config.whole_body.joint_margin,
-            self._clearance.too_near,
-            self._clearance.tool_too_near,
-            self._clearance.tool_room,
+            self._clearance,
         )
         self._rollout = Rollout(config, robot_config)
 
@@ -81,7 +79,7 @@ class CutPlanner:
 
     def _postures(self, request: PlanRequest) -> tuple[dict[str, CutPlan], dict[str, Reason]]:
         """A posture for each cut, and the reason where there is none."""
-        self._clearance.update(Received(Obstacles(header=Header(), capsules=request.obstacles), 0.0))
+        self._clearance.update(Received(Obstacles(header=Header(), capsules=request.obstacles), 0.0), request.canes)
         turned, tries = dict(request.turned), dict(request.tries)
         cuts: dict[str, CutPlan] = {}
         refused: dict[str, Reason] = {}
@@ -121,6 +119,7 @@ class CutPlanner:
                 request.close_up_s,
                 request.turned,
                 request.tries,
+                request.canes,
             )
         )
 
@@ -132,6 +131,7 @@ class CutPlanner:
             self._robot_config,
             request.points,
             request.obstacles,
+            request.canes,
             request.order,
             request.turned,
             request.tries,

@@ -96,7 +96,10 @@ class PlanManager:
         self._number += 1
         self._asked_at = now
         tries = self._queue.tries.made
-        self._asked = PlanRequest(self._number, q.copy(), accepted, tuple(obstacles), order, turned, tries, close_up_s)
+        canes = self._queue.canes
+        self._asked = PlanRequest(
+            self._number, q.copy(), accepted, tuple(obstacles), order, turned, tries, close_up_s, canes
+        )
         self._check(why, True)
         return self._asked
 

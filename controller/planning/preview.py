@@ -99,6 +99,11 @@ class PreviewManager:
             return None
         return reasons.preview_expired(self._reason)
 
+    @property
+    def binds(self) -> bool:
+        """Whether the work may take no other way than the one that was shown."""
+        return self.required or self._begun
+
     def start(self) -> None:
         """Work begins."""
         self._begun = self._phase == "approved"
@@ -186,9 +191,9 @@ class PreviewManager:
         following, names = self._queue.next(), tuple(point.point_id for point in points)
         # While it is valid, only people change its order.
         self._order = names if following is not None and following.point.point_id == names[0] else ()
-        turned, tries = self._queue.approaches.turned, self._queue.tries.made
+        turned, tries, canes = self._queue.approaches.turned, self._queue.tries.made, self._queue.canes
         self._asked = PreviewRequest(
-            self._number, q.copy(), points, tuple(obstacles), dict(cuts or {}), close_up_s, turned, tries
+            self._number, q.copy(), points, tuple(obstacles), dict(cuts or {}), close_up_s, turned, tries, canes
         )
         self._set_phase("rolling")
         return self._asked

@@ -7,7 +7,7 @@ import numpy as np
 
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.collision_geometry import Shapes
-from controller.work.posture_search import CutPlan
+from controller.work.posture_search import CutPlan, Polylines
 from controller.work.tries import Made
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import Capsule, PruningPoint
@@ -57,6 +57,7 @@ class PreviewRequest:
     close_up_s: float = 0.5
     turned: tuple[tuple[str, float], ...] = ()
     tries: Made = ()
+    canes: Polylines = ()
 
 
 @dataclass(frozen=True, eq=False)

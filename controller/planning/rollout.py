@@ -71,7 +71,8 @@ class _Run:
         self._journal = Journal()
         # What is not reached at once is refused: the plan is of one try.
         self._queue = PointQueue(config.work, self._journal, tries=1)
-        self._queue.update(m.PruningPoints(header=m.Header(), segmenter="", frames=0, points=request.points))
+        told = m.PruningPoints(header=m.Header(), segmenter="", frames=0, points=request.points, canes=request.canes)
+        self._queue.update(told)
         for point in request.points:
             self._queue.accept(point.point_id, point.revision, "preview")
         for point_id, azimuth in request.turned:
@@ -213,7 +214,7 @@ class _Run:
         encode = msgspec.msgpack.Encoder(order="deterministic").encode
         request, out = self._request, self._hash
         wanted = request.turned, request.tries
-        for part in (*self._configs, request.points, request.obstacles, *wanted, request.close_up_s):
+        for part in (*self._configs, request.points, request.obstacles, request.canes, *wanted, request.close_up_s):
             out.update(encode(part))
         out.update(np.ascontiguousarray(request.q, dtype="<f8").tobytes())
         return out.hexdigest()

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from controller.work.posture_search import CutPlan
+from controller.work.posture_search import CutPlan, Polylines
 from controller.work.tries import Made
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import Capsule, PruningPoint
@@ -27,6 +27,7 @@ class PlanRequest:
         order: Points in the order set by people; empty if the plan chooses the order.
         tries: Failed tries of each point, with the cane that was met.
         close_up_s: Time from the request of a close-up to its result (s).
+        canes: Axes of all standing canes (m).
     """
 
     number: int
@@ -37,6 +38,7 @@ class PlanRequest:
     turned: tuple[tuple[str, float], ...] = ()
     tries: Made = ()
     close_up_s: float = 0.5
+    canes: Polylines = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -190,27 +190,28 @@ class CollisionModel:
             np.array([result.getNearestPoint2() for result in results]).reshape(-1, 3),
         )
 
-    def tool_distances(self, T_odom_tool: Any, within: float) -> tuple[Array, tuple[Pair, ...]]:
-        """Distances of the tool's parts from the obstacles with the tool at a pose, whatever the posture of the arm.
+    def tool_distances(self, places: Sequence[Any], within: float) -> tuple[Array, Any, tuple[Pair, ...]]:
+        """Distances of the tool's parts from the obstacles with the tool at some poses, whatever the arm's posture.
 
         Args:
-            T_odom_tool: Pose of the tool (pin.SE3).
+            places: Poses of the tool (pin.SE3, in odom).
             within: Farther pairs do not count (m).
 
         Returns:
-            Distances (k, m) and names of both sides (k).
+            Distances (k, m), the number of the pose of each (k), and names of both sides (k).
         """
-        gaps = self.tool_gaps(T_odom_tool, self._axes)
+        gaps = self.tool_gaps(places, self._axes)
         if self._ignores:
-            gaps[self._ignored[self._tool_rows]] = np.inf
+            gaps[:, self._ignored[self._tool_rows]] = np.inf
         near = np.argwhere(gaps < within)
-        pairs = [(self._parts[self._tool_rows[part]], self._obstacles[at].name) for part, at in near.tolist()]
-        return gaps[near[:, 0], near[:, 1]], tuple(pairs)
+        pairs = [(self._parts[self._tool_rows[part]], self._obstacles[at].name) for _, part, at in near.tolist()]
+        return gaps[tuple(near.T)], near[:, 0], tuple(pairs)
 
-    def tool_gaps(self, T_odom_tool: Any, axes: Axes) -> Array:
-        """Distances (t×n, m) of the tool's parts, at a pose (pin.SE3), from the axes of n obstacles."""
-        ends = self._tool_ends @ T_odom_tool.rotation.T + T_odom_tool.translation
-        return axes.capsule_gaps(ends[0], ends[1], self._tool_radii)
+    def tool_gaps(self, places: Sequence[Any], axes: Axes) -> Array:
+        """Distances (p×t×n, m) of the tool's parts, at p poses (pin.SE3), from the axes of n obstacles."""
+        ends = np.concatenate([self._tool_ends @ T.rotation.T + T.translation for T in places], axis=1)
+        gaps = axes.capsule_gaps(ends[0], ends[1], np.tile(self._tool_radii, len(places)))
+        return gaps.reshape(len(places), len(self._tool_radii), -1)
 
     def least(self, q: Array) -> Clearance:
         """Smallest distance of all monitored pairs at q (12)."""

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -54,6 +55,17 @@ class Axes:
         square = np.sum(self._along * self._along, axis=1)
         self._inverse = np.where(square > _POINT, 1.0 / np.maximum(square, _POINT), 0.0)
         self._radius = np.array([o.radius for o in obstacles], dtype=np.float64)
+
+    def part(self, which: Any) -> "Axes":
+        """Those of some of the obstacles (indices)."""
+        out = Axes(())
+        out._start, out._along = self._start[which], self._along[which]
+        out._inverse, out._radius = self._inverse[which], self._radius[which]
+        return out
+
+    def ends(self, number: int) -> Array:
+        """Both ends of one (2×3, m)."""
+        return np.array([self._start[number], self._start[number] + self._along[number]])
 
     def gaps(self, centers: Array, radii: Array) -> Array:
         """Gaps (g×n, m) between g spheres and the n obstacles; negative where they overlap."""

@@ -29,7 +29,16 @@ from controller.work.camera_views import CameraViews, Refusal
 from controller.work.close_up import CloseUpClient, PostCutCheck, camera_ready, not_as_accepted
 from controller.work.homing import Withdrawal
 from controller.work.point_queue import TOLD_MOVED, PointQueue
-from controller.work.posture_search import CutPlan, Known, NextCut, Permit, PostureSearch, Unreachable, escape_pose
+from controller.work.posture_search import (
+    CutPlan,
+    Fitted,
+    Known,
+    NextCut,
+    Permit,
+    PostureSearch,
+    Unreachable,
+    escape_pose,
+)
 from controller.work.servo import CutServo
 from controller.work.step_result import StepResult
 from controller.work.survey import Survey
@@ -195,9 +204,11 @@ class Parts:
         servo: Corrects the motion to a cut by pictures on the way.
         post_cut_check: Check of the last cuts.
         blades: Orders the cuts.
-        next_cut: Posture search for the next point.
+        search: Posture search.
+        next_cut: The same for the next point.
         planned_from: Whether the plan tells which points can be reached from a configuration (12, map); also True when
             no plan can be had.
+        as_shown: Whether the work may take no other way than the one that was shown.
         ending: Reason to begin no further cut; None without one.
         cut_point: Point of the last cut; empty before the first.
         cut_at: Position of the tool at the last cut (3, m, odom).
@@ -213,8 +224,10 @@ class Parts:
     servo: CutServo
     post_cut_check: PostCutCheck
     blades: Blades
+    search: PostureSearch
     next_cut: NextCut
     planned_from: Callable[[Array], bool]
+    as_shown: Callable[[], bool]
     ending: m.Reason | None = None
     cut_point: str = ""
     cut_at: Array = field(default_factory=lambda: np.zeros(3))
@@ -286,12 +299,14 @@ class CutTask:
         accepted: The point as accepted; the plan is for one acceptance.
         planned: Poses and postures in map.
         frame: Where odom is in map.
+        turned: Whether a close-up has had it approached another way than planned.
     """
 
     point_id: str
     accepted: m.PruningPoint | None
     planned: CutPlan
     frame: MapFrame
+    turned: bool = False
 
     @cached_property
     def plan(self) -> CutPlan:
@@ -612,7 +627,7 @@ class CloseUp(MovingStage):
 
     def step(self, robot: Measured, now: float) -> Step:
         """One period."""
-        parts, motion = self._parts, self._way.motion
+        parts = self._parts
         if left := self._left(self.point_id, self._task.accepted):
             return self._escape(robot, now, left)
         if parts.ending:
@@ -628,16 +643,87 @@ class CloseUp(MovingStage):
             parts.queue.void(self.point_id, why)
             # The next period leaves it.
             return self, result
-        position, accepted = np.array(close_up.position), self._task.accepted
-        motion.extend(parts.segments.into(self._task.plan))
-        _shift(motion, position)
+        return Fitting(parts, self._task, self._way, robot, np.array(close_up.position)), result
+
+
+class Fitting(MovingStage):
+    """Check the cut where the close-up has seen it, among what is known now, before the canes are entered.
+
+    Where the planned approach has no room there, another one is taken, and a close-up from there checks again. Without
+    one the cut is put off.
+    """
+
+    phase: m.Phase = "CLOSE_UP"
+
+    def __init__(self, parts: Parts, task: CutTask, way: FollowedMotion, robot: Measured, seen: Array) -> None:
+        """For a cut that was `seen` somewhere (3, m, odom), with the tool clear of the canes."""
+        super().__init__(parts, replace(task, frame=robot.frame), way)
+        self._seen, queue, point = seen, parts.queue, task.accepted
+        assert point is not None
+        self._fit = parts.search.fit(
+            task.planned,
+            point,
+            robot.frame.position_in_map(seen),
+            queue.approaches.of(task.point_id),
+            queue.tries.of(task.point_id),
+            others=not task.turned and not parts.as_shown(),
+        )
+        self._fitted: Fitted | None = None
+
+    def step(self, robot: Measured, now: float) -> Step:
+        """One period."""
+        parts = self._parts
+        if left := self._left(self.point_id, self._task.accepted):
+            return self._escape(robot, now, left)
+        if parts.ending:
+            return self, parts.brake(robot, parts.ending)
+        fitted = self._fitted = self._fitted or self._search()
+        if fitted is None:
+            tracking = self._way.track(robot)
+            return self, StepResult(tracking.xi, tracking)
+        if fitted.plan is not None and fitted.lacking is None:
+            return self._enter(robot, fitted.plan)
+        if np.any(robot.sent):
+            # Another motion begins at rest.
+            return self, parts.brake(robot)
+        return self._turn(robot, fitted)
+
+    def _search(self) -> Fitted | None:
+        for _ in range(self._parts.config.search_steps_each):
+            try:
+                next(self._fit)
+            except StopIteration as end:
+                fitted: Fitted = end.value
+                return fitted
+        return None
+
+    def _enter(self, robot: Measured, plan: CutPlan) -> Step:
+        """Straight in, to where the cut was seen."""
+        parts, motion, accepted = self._parts, self._way.motion, self._task.accepted
+        motion.extend(replace(parts.segments.into(self._task.plan), q_goal=plan.q_cut))
+        _shift(motion, self._seen)
         parts.servo.begin(self.point_id, motion.goal)
         self._way.timeout.start(motion.duration)
-        known = None if accepted is None else robot.frame.position_in_odom(np.array(accepted.position))
-        moved = 0.0 if known is None else math.dist(position, known)
+        tracking = self._way.track(robot)
+        result = StepResult(tracking.xi, tracking)
+        known = None if accepted is None else self._task.frame.position_in_odom(np.array(accepted.position))
+        moved = 0.0 if known is None else math.dist(self._seen, known)
         if moved > TOLD_MOVED:
             result = result.with_event(reasons.cut_where_seen(self.point_id, 1e3 * moved))
-        return Advance(parts, self._task, self._way), result
+        return Advance(parts, replace(self._task, planned=plan), self._way), result
+
+    def _turn(self, robot: Measured, fitted: Fitted) -> Step:
+        """Another way to where the cut was seen, else none."""
+        parts, task, why = self._parts, self._task, fitted.lacking or reasons.unexplained()
+        if fitted.plan is None:
+            none = reasons.no_room_where_seen(why)
+            told = parts.queue.put_off(self.point_id, Tried(task.planned.approach), reasons.missed_once(none), none)
+            parts.next_cut.forget()
+            return Escape(parts), parts.brake(robot).with_event(told)
+        task = replace(task, planned=fitted.plan, turned=True)
+        legs = parts.segments.to(task.plan, robot.kinematics.T_odom_tool, robot.q)
+        way = FollowedMotion(parts, robot, *legs, to_cut=True)
+        return Travel(parts, task, way), parts.brake(robot).with_event(reasons.turned_where_seen(self.point_id, why))
 
 
 class Advance(MovingStage):
@@ -826,11 +912,12 @@ class CutSequence:
         known: Known = lambda _: None,
         permit: Permit = lambda _: None,
         planned_from: Callable[[Array], bool] = lambda _: True,
+        as_shown: Callable[[], bool] = lambda: False,
     ) -> None:
         """Bind the parts.
 
         `run_id` makes the cut ids of this start unique. `known` gives the planned cut of a point, and
-        `permit` the reason why the robot may not approach it. `planned_from` is as in `Parts`.
+        `permit` the reason why the robot may not approach it. `planned_from` and `as_shown` are as in `Parts`.
         """
         close_ups = CloseUpClient(config.work.close_up_timeout_s, _PICTURES, _BLIND_PICTURES)
         check = PostCutCheck(queue, close_ups, config.work.post_cut_check)
@@ -844,8 +931,10 @@ class CutSequence:
             CutServo(config.work),
             check,
             Blades(config.work, queue, run_id, check.start),
+            search,
             NextCut(search, queue, config.search_steps_each, known, permit),
             planned_from,
+            as_shown,
         )
         self._stage: Stage = Rest(self._parts)
         self._survey: Survey | None = None
@@ -969,7 +1058,7 @@ class CutSequence:
     @property
     def may_give_way(self) -> bool:
         """Whether a known cane that pushes now is no contact."""
-        ways_in = Travel | CloseUp | Advance
+        ways_in = Travel | CloseUp | Fitting | Advance
         return self._stage.yields and (not isinstance(self._stage, ways_in) or self._parts.gave_way < _PUSHES)
 
     def pushed(self, contact: ContactMonitor, trail: Trail, frame: MapFrame) -> m.Reason | None:
@@ -987,7 +1076,7 @@ class CutSequence:
         if push is None or push.axis is None or isinstance(stage, GivingWay):
             return None
         what = push.part, push.obstacle, float(np.linalg.norm(push.force))
-        if push is self._pushed or not isinstance(stage, Travel | CloseUp | Advance):
+        if push is self._pushed or not isinstance(stage, Travel | CloseUp | Fitting | Advance):
             # The way back would lead into the canes.
             news, self._pushed = push is not self._pushed, push
             if not contact.beyond:

@@ -62,6 +62,7 @@ class Movement:
         method: Method | None = None,
         permit: Permit = lambda _: None,
         planned_from: Callable[[Array], bool] = lambda _: True,
+        as_shown: Callable[[], bool] = lambda: False,
     ) -> None:
         """Build the robot's model and the motion sources.
 
@@ -76,12 +77,13 @@ class Movement:
             permit: Gives the reason why the robot may not approach a point; None if it may.
             planned_from: Whether the plan tells which points can be reached from a configuration (12, map); also True
                 when no plan can be had.
+            as_shown: Whether the work may take no other way than the one that was shown.
 
         Raises:
             ConfigError: There is no such method.
             ModelError: A robot description is missing.
         """
-        self._config, self._event_log = config, event_log
+        self._config, self._event_log, self._queue = config, event_log, queue
         self.body = body = Body(config, robot_config, method)
         self._saturation, self._setpoints = body.saturation, body.setpoints
         self._clearance = CutClearance(RobotModel(robot_config), config.whole_body.hierarchy)
@@ -89,12 +91,10 @@ class Movement:
             RobotModel(robot_config),
             config.work,
             config.whole_body.joint_margin,
-            self._clearance.too_near,
-            self._clearance.tool_too_near,
-            self._clearance.tool_room,
+            self._clearance,
         )
         self.sequence = CutSequence(
-            config, search, body.follower, body.saturation, queue, run_id, known, permit, planned_from
+            config, search, body.follower, body.saturation, queue, run_id, known, permit, planned_from, as_shown
         )
         self.posture_check = PostureCheck(RobotModel(robot_config), config.whole_body)
         check = self.posture_check
@@ -138,7 +138,7 @@ class Movement:
         """Update state and obstacles from what has arrived."""
         self.body.update(inbox)
         self.body.surroundings.work_at(self.sequence.places)
-        self._clearance.update(inbox.newest(Obstacles))
+        self._clearance.update(inbox.newest(Obstacles), self._queue.canes)
         self.posture_check.update(self.body.obstacles)
 
     def look_around(self, prefix: str) -> None:

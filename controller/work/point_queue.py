@@ -17,7 +17,7 @@ from rolling_panda import reasons
 from rolling_panda.commands import POINT_STATES, Handler, Handlers
 from rolling_panda.messages.perception import PruningPoint, PruningPoints, PruningRule, identity, point_digest
 from rolling_panda.messages.supervision import QueueEntry
-from rolling_panda.messages.types import PointState, Reason
+from rolling_panda.messages.types import PointState, Reason, Vector3
 from rolling_panda.model.differential_drive import Array
 
 #: A cane that turned further than this after acceptance is not the one the operator saw (rad).
@@ -88,6 +88,11 @@ class PointQueue:
         """What came of earlier tries of the accepted cuts."""
         self._rules: RuleHistory[Ticket] = RuleHistory()
         self._restored: list[str] = []
+
+    @property
+    def canes(self) -> tuple[tuple[Vector3, ...], ...]:
+        """Axes of all standing canes (m, map)."""
+        return () if self.perceived is None else self.perceived.canes
 
     def update(self, points: PruningPoints, keep: str = "") -> list[Reason]:
         """Update from perception's current points; returns the voided acceptances.

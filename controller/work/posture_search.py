@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from itertools import product
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
@@ -27,7 +27,7 @@ from controller.work.tries import Approach, Line, Tried
 from rolling_panda import reasons
 from rolling_panda.errors import InputError
 from rolling_panda.messages.perception import Capsule, Obstacles, PruningPoint
-from rolling_panda.messages.types import CutKind, Reason
+from rolling_panda.messages.types import CutKind, Reason, Vector3
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.map_frame import MapFrame
 from rolling_panda.model.robot import ARM_Q, RobotModel
@@ -35,6 +35,8 @@ from rolling_panda.transport.inbox import Received
 
 #: An approach this close to the cane's direction is undefined.
 _LEAST_SINE = 0.2
+#: Distance of two poses of the straight way in that are checked (m).
+_APART = 0.02
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,13 @@ class CutPoses:
     def way(self) -> tuple[Any, Any, Any]:
         """The three in the order of the way in."""
         return self.clear, self.stand_off, self.cut
+
+    @property
+    def between(self) -> tuple[Any, ...]:
+        """Poses of the straight way from the stand-off to the cut, both left out, `_APART` apart."""
+        start, end = self.stand_off.translation, self.cut.translation
+        count = math.ceil(math.dist(start, end) / _APART)
+        return tuple(pin.SE3(self.cut.rotation, start + (end - start) * number / count) for number in range(1, count))
 
 
 def cut_poses(
@@ -144,6 +153,11 @@ _TURNS, _TILTS, _LEANS, _STUB_LEANS = (0.0, 0.35, 0.7), (0.0, 0.13, 0.26), (0.0,
 #: An approach that differs from a tried one by this is another one (rad), and room beside a cane that was met which is
 #: enough (m): how far canes lean and swing, and what the map may err.
 _ANOTHER, _ENOUGH = 0.2, 0.03
+#: Room of the tool on the way in beside canes that would give way (m), which is enough: with less another approach is
+#: preferred, which may be slower and pass wires more closely.
+_BESIDE_ENOUGH = 0.003
+#: Most postures that are tried for a cut that is seen elsewhere than planned: the robot waits for them.
+_FITS = 12
 #: Largest distance from the arm's shoulder to its wrist, with elbow and wrist offsets (m, Panda), and from the
 #: wrist to the flange (m).
 _ARM_LENGTH, _WRIST_TO_FLANGE = 0.3266 + 0.3928 + 0.088, 0.107
@@ -212,6 +226,19 @@ class Unreachable:
 
 
 @dataclass(frozen=True)
+class Fitted:
+    """A plan at the place where a close-up has seen its cut.
+
+    Attributes:
+        plan: The plan; None where no approach has room.
+        lacking: What the planned approach lacks there; None where it is taken.
+    """
+
+    plan: CutPlan | None
+    lacking: Reason | None
+
+
+@dataclass(frozen=True)
 class _Posture:
     q: Array
     margin: float
@@ -221,28 +248,16 @@ class _Posture:
 class PostureSearch:
     """Searches cut plans. It has its own robot model, so that a search can be suspended while control runs."""
 
-    def __init__(
-        self,
-        robot: RobotModel,
-        config: WorkConfig,
-        joint_margin: float,
-        too_near: Callable[[CutPlan], tuple[float, Reason | None]] = lambda _: (0.0, None),
-        tool_too_near: Callable[[CutPoses, PruningPoint], tuple[float, Reason | None]] = lambda *_: (0.0, None),
-        tool_room: Callable[[CutPoses, Sequence[Line]], float] = lambda *_: 0.0,
-    ) -> None:
+    def __init__(self, robot: RobotModel, config: WorkConfig, joint_margin: float, clearance: "CutClearance") -> None:
         """Remember the model and the row's direction.
 
         Args:
             robot: Model of its own.
             config: The row and the usual postures.
             joint_margin: Distance from every joint limit (rad).
-            too_near: How much of a required distance a plan lacks (m), with its place and parts; None if it lacks none.
-                Another plan is not returned.
-            tool_too_near: The same for the tool alone at the poses of a cut of a point, where no posture helps.
-            tool_room: Least distance of the tool from canes with these axes on its way into a cut (m).
+            clearance: What is known to stand around; only plans that keep clear of it are returned.
         """
-        self._robot, self._config, self._too_near, self._tool_too_near = robot, config, too_near, tool_too_near
-        self._tool_room = tool_room
+        self._robot, self._config, self._clearance = robot, config, clearance
         c, s = np.cos(config.row_heading), np.sin(config.row_heading)
         self._along, self._left = np.array([c, s, 0.0]), np.array([-s, c, 0.0])
         self._base_id = robot.frame_id("base_link")
@@ -267,56 +282,130 @@ class PostureSearch:
             tried: Failed tries: another approach is found, with room beside the canes that were met.
         """
         position, tangent = np.array(point.position), np.array(point.tangent)
-        best: CutPlan | None = None
         passed_over: list[tuple[float, Reason]] = []
-        seeds = (np.array(self._config.reach), np.array(self._config.home))
-        base = np.array([q[0], q[1], 0.0])
-        lateral = float(base @ self._left)
-        config = self._config
         usual = len(APPROACHES if azimuth is None else TILTS)
         wanted = approaches(azimuth, point.kind)
         if tried:
             wanted = yield from self._others(wanted, tried, position, tangent)
             usual = len(wanted)
+        # Where open blades would push canes aside, after the others: those with the most room first.
+        tight: list[tuple[float, Approach, CutPoses]] = []
         for number, approach in enumerate(wanted):
             # More approaches help where something is in the way, not where the arm does not get there.
-            if number == usual and not passed_over:
+            if number == usual and not passed_over and not tight:
                 break
             try:
                 poses = self._poses(position, tangent, approach)
             except InputError:
                 return Unreachable(reasons.no_square_approach())
-            lacking, nearest = self._tool_too_near(poses, point)
+            lacking, nearest = self._clearance.tool_too_near(poses, point)
             if nearest is not None:
                 passed_over.append((lacking, nearest))
                 yield
                 continue
-            for offset in OFFSETS:
-                place = (float(position @ self._along) - offset) * self._along + lateral * self._left
-                start = q.copy()
-                start[:3] = place[0], place[1], config.row_heading
-                if self._too_far(poses.cut, start):
-                    continue
-                for seed in seeds:
-                    plan = yield from self._try(poses, start, seed)
-                    if plan is None:
-                        continue
-                    plan = replace(plan, approach=approach)
-                    lacking, nearest = self._too_near(plan)
-                    if nearest is not None:
-                        passed_over.append((lacking, nearest))
-                        continue
-                    if plan.joint_margin >= _GOOD_MARGIN and plan.manipulability >= _GOOD_OMEGA:
-                        return plan
-                    if best is None or _quality(plan) > _quality(best):
-                        best = plan
+            yield
+            if (room := self._clearance.beside(poses, point)) < _BESIDE_ENOUGH:
+                tight.append((room, approach, poses))
+                yield
+                continue
             # A good posture with the straight approach is preferred to a better one from the side.
-            if best is not None:
-                return best
+            if (plan := (yield from self._best(poses, approach, q, passed_over))) is not None:
+                return plan
+        for _, approach, poses in sorted(tight, key=lambda each: -each[0]):
+            if (plan := (yield from self._best(poses, approach, q, passed_over))) is not None:
+                return plan
         if passed_over:
             return Unreachable(reasons.no_clear_posture(min(passed_over, key=lambda each: each[0])[1]))
-        distance = float(position @ self._left) - lateral
-        return Unreachable(reasons.out_of_reach(distance, float(position[2])))
+        return Unreachable(self._beyond(position, q))
+
+    def fit(
+        self,
+        plan: CutPlan,
+        point: PruningPoint,
+        seen: Array,
+        azimuth: float | None = None,
+        tried: Sequence[Tried] = (),
+        others: bool = True,
+    ) -> Generator[None, None, "Fitted"]:
+        """The plan of a cut where a close-up has seen it, with the base where the plan has it.
+
+        The planned approach is taken where it has room there, else the one nearest to it that has. The errors of map
+        and arm often shift all wood alike. So no cane that stays may be between the closing blades where the cut is
+        seen, nor where it is in the map.
+
+        Args:
+            plan: The plan.
+            point: The cut as accepted.
+            seen: Where the close-up has seen it (3, m, map).
+            azimuth: Turn of the approach about the cane (rad) set by a person; None leaves it to the search.
+            tried: Failed tries, whose approaches are not taken again.
+            others: False allows no other approach than the planned one.
+        """
+        known, tangent = np.array(point.position), np.array(point.tangent)
+        in_map = known + tangent * float((seen - known) @ tangent)
+        lacking: Reason | None = None
+        left = _FITS
+        for approach in self._nearest(plan.approach, point, azimuth, tried) if others else (plan.approach,):
+            spare = approach != plan.approach
+            poses = self._poses(seen, tangent, approach)
+            why = self._clearance.tool_too_near(poses, point, spare)[1]
+            why = why or self._clearance.bitten(self._poses(in_map, tangent, approach).cut, point)[1]
+            yield
+            if why is None:
+                left -= 1
+                found = yield from self._try(poses, plan.q_stand_off, plan.q_stand_off[ARM_Q])
+                why = self._beyond(seen, plan.q_cut) if found is None else self._clearance.too_near(found, spare)[1]
+                if found is not None and why is None:
+                    return Fitted(replace(found, approach=approach), lacking)
+                yield
+            lacking = lacking or why
+            if left == 0:
+                break
+        return Fitted(None, lacking)
+
+    def _nearest(
+        self, planned: Approach, point: PruningPoint, azimuth: float | None, tried: Sequence[Tried]
+    ) -> list[Approach]:
+        """The planned approach, and the others in the order of their distance from it."""
+        others = {
+            each
+            for each in approaches(azimuth, point.kind)
+            if each != planned and all(math.dist(each, one.approach) >= _ANOTHER for one in tried)
+        }
+        return [planned, *sorted(others, key=lambda each: (math.dist(each, planned), each))]
+
+    def _best(
+        self, poses: CutPoses, approach: Approach, q: Array, passed_over: list[tuple[float, Reason]]
+    ) -> Generator[None, None, CutPlan | None]:
+        """The first good plan with an approach, else the best one; adds what was too near to `passed_over`."""
+        config, position = self._config, poses.cut.translation
+        best: CutPlan | None = None
+        lateral = float(np.array([q[0], q[1], 0.0]) @ self._left)
+        for offset in OFFSETS:
+            place = (float(position @ self._along) - offset) * self._along + lateral * self._left
+            start = q.copy()
+            start[:3] = place[0], place[1], config.row_heading
+            if self._too_far(poses.cut, start):
+                continue
+            for seed in (np.array(config.reach), np.array(config.home)):
+                plan = yield from self._try(poses, start, seed)
+                if plan is None:
+                    continue
+                plan = replace(plan, approach=approach)
+                lacking, nearest = self._clearance.too_near(plan)
+                if nearest is not None:
+                    passed_over.append((lacking, nearest))
+                    continue
+                if plan.joint_margin >= _GOOD_MARGIN and plan.manipulability >= _GOOD_OMEGA:
+                    return plan
+                if best is None or _quality(plan) > _quality(best):
+                    best = plan
+        return best
+
+    def _beyond(self, position: Array, q: Array) -> Reason:
+        """That no posture reaches a place from the line on which the base drives."""
+        lateral = float(np.array([q[0], q[1], 0.0]) @ self._left)
+        return reasons.out_of_reach(float(position @ self._left) - lateral, float(position[2]))
 
     def _poses(self, position: Array, tangent: Array, approach: Approach) -> CutPoses:
         config = self._config
@@ -335,7 +424,7 @@ class PostureSearch:
                 poses = self._poses(position, tangent, approach)
             except InputError:
                 break
-            room[approach] = min(self._tool_room(poses, met), _ENOUGH) if met else _ENOUGH
+            room[approach] = min(self._clearance.tool_room(poses, met), _ENOUGH) if met else _ENOUGH
             yield
         return tuple(sorted(room, key=lambda each: -room[each]))
 
@@ -405,8 +494,13 @@ def completed(search: Generator[None, None, CutPlan | Unreachable]) -> CutPlan |
 
 #: Distance kept from everything where the tool is clear of the canes (m).
 CLEARANCE = 0.02
-#: Margin above the smallest distance of the guard (m): close to it the robot is very slow.
-_ROOM = 0.003
+#: Margin above the smallest distance of the guard (m): close to it the robot is very slow. Just before the way in less
+#: is enough, as nothing changes any more.
+_ROOM, _LEAST_ROOM = 0.003, 0.001
+#: Axes of canes (m).
+Polylines = tuple[tuple[Vector3, ...], ...]
+#: Canes this near to a cut may be beside the tool on its way in (m).
+_AROUND = 0.3
 #: Radius of a cane of which only the axis is told, and distance from the bark up to which a cut is on it (m).
 _THIN, _OWN = 0.005, 0.015
 #: By so much a posture may miss a pose (m).
@@ -428,67 +522,105 @@ class CutClearance:
         self._settings = settings
         self._surroundings = Surroundings(CollisionModel(robot))
         self._within = max(settings.collision_distance + _ROOM, CLEARANCE)
+        self._lines: Polylines = ()
+        self._axes, self._line_of = Axes(()), np.zeros(0, dtype=int)
 
-    def update(self, obstacles: Received[Obstacles] | None) -> None:
-        """Take the newest message; one that was taken before costs nothing."""
+    def update(self, obstacles: Received[Obstacles] | None, canes: Polylines = ()) -> None:
+        """Take the newest messages; what was taken before costs nothing.
+
+        Args:
+            obstacles: What stands around.
+            canes: Axes of all standing canes, with those that will be cut off (polylines, m, map).
+        """
         self._surroundings.update(obstacles)
+        if canes is not self._lines:
+            self._lines = canes
+            pieces = [(number, *ends) for number, line in enumerate(canes) for ends in pairwise(line)]
+            self._axes = Axes(tuple(Obstacle("", "cane", start, end, _THIN) for _, start, end in pieces))
+            self._line_of = np.array([number for number, _, _ in pieces], dtype=int)
 
-    def too_near(self, plan: CutPlan) -> tuple[float, Reason | None]:
+    def too_near(self, plan: CutPlan, spare: bool = True) -> tuple[float, Reason | None]:
         """Largest violation of a required distance (m), with its place and parts; None without one.
 
         Places: at the cut, at the stand-off and clear of the canes. The blades may touch the spur that is cut.
+
+        Args:
+            plan: The plan.
+            spare: Whether it has the room of a plan, beyond what the guard needs on the way.
         """
         if not self._settings.collisions:
             return 0.0, None
         self._surroundings.work_at((plan.poses.cut.translation,))
-        found: list[tuple[float, Reason | None]] = [(0.0, None)]
         places: tuple[tuple[reasons.Place, Array], ...] = (
             ("at the cut", plan.q_cut),
             ("at the stand-off", plan.q_stand_off),
             ("clear of it", plan.q_clear),
         )
+        near: list[tuple[reasons.Place, float, Pair]] = []
         for where, q in places:
-            near = self._surroundings.model.distances(q, self._within)
-            found.append(self._lacking(where, near.distance, near.pairs))
-        return max(found, key=lambda each: each[0])
+            found = self._surroundings.model.distances(q, self._within)
+            near += [(where, *each) for each in zip(found.distance.tolist(), found.pairs, strict=True)]
+        return self._lacking(near, spare)
 
-    def tool_too_near(self, poses: CutPoses, point: PruningPoint) -> tuple[float, Reason | None]:
-        """The same of the tool alone, which no posture of the arm changes.
+    def tool_too_near(self, poses: CutPoses, point: PruningPoint, spare: bool = True) -> tuple[float, Reason | None]:
+        """The same of the tool alone, which no posture of the arm changes, all along its way in.
 
         A cane that stays, or may stay, must not be between the blades either, though they would pass it open.
 
         Args:
             poses: Of the tool.
             point: The cut.
+            spare: As of `too_near`.
         """
         if not self._settings.collisions:
             return 0.0, None
         self._surroundings.work_at((poses.cut.translation,))
-        found: list[tuple[float, Reason | None]] = [(0.0, None), self._bitten(poses.cut, point)]
         places: tuple[tuple[reasons.Place, Any], ...] = (
             ("at the cut", poses.cut),
+            *(("on the way in", pose) for pose in poses.between),
             ("at the stand-off", poses.stand_off),
             ("clear of it", poses.clear),
         )
-        for where, pose in places:
-            found.append(self._lacking(where, *self._surroundings.model.tool_distances(pose, self._within), _INEXACT))
-        return max(found, key=lambda each: each[0])
+        found = self._surroundings.model.tool_distances([pose for _, pose in places], self._within)
+        near = [(places[at][0], float(distance), pair) for distance, at, pair in zip(*found, strict=True)]
+        return max(self.bitten(poses.cut, point), self._lacking(near, spare, _INEXACT), key=lambda each: each[0])
 
     def tool_room(self, poses: CutPoses, axes: Sequence[Line]) -> float:
         """Least distance of the tool from some canes on its way into a cut (m); infinite from the cane that is cut."""
         canes = Axes(tuple(Obstacle("", "cane", start, end, _THIN) for start, end in axes))
         own = canes.gaps(poses.cut.translation[None], np.zeros(1))[0] < _OWN
-        gaps = np.array([self._surroundings.model.tool_gaps(pose, canes).min(axis=0) for pose in poses.way])
+        gaps = self._surroundings.model.tool_gaps(poses.way, canes)
         return float(np.where(own, np.inf, gaps).min())
 
+    def beside(self, poses: CutPoses, point: PruningPoint) -> float:
+        """Least distance of the tool, with open blades, from standing canes on its way into a cut (m).
+
+        Canes that will be cut off count too, but for the one that is cut, or those that fall with a stub; so do canes
+        that the blades may push aside. A cane between the blades has none.
+        """
+        cut = poses.cut.translation
+        gaps = self._axes.gaps(cut[None], np.zeros(1))[0]
+        own = set(self._line_of[gaps < _OWN].tolist())
+        if own and point.kind != "renewal cut":
+            own = {int(self._line_of[int(np.argmin(gaps))])}
+        others = np.flatnonzero((gaps < _AROUND) & ~np.isin(self._line_of, list(own)))
+        if not len(others):
+            return math.inf
+        canes = self._axes.part(others)
+        room = float(self._surroundings.model.tool_gaps((*poses.between, poses.cut), canes).min())
+        for number in np.flatnonzero(gaps[others] < _BESIDE).tolist():
+            inside, _ = _in_box((canes.ends(number) - cut) @ poses.cut.rotation)
+            room = min(room, -inside)
+        return room
+
     def _lacking(
-        self, where: reasons.Place, distances: Array, pairs: Sequence[Pair], inexact: float = 0.0
+        self, near: Sequence[tuple[reasons.Place, float, Pair]], spare: bool, inexact: float = 0.0
     ) -> tuple[float, Reason | None]:
-        """Largest violation of a required distance at one place; `inexact` is forgiven (m)."""
+        """Largest violation of a required distance of pairs at places; `inexact` is forgiven (m)."""
         worst, found = 0.0, None
-        for distance, pair in zip(distances.tolist(), pairs, strict=True):
-            needed = self._settings.kept(pair) + _ROOM
-            if where == "clear of it":
+        for where, distance, pair in near:
+            needed = self._settings.kept(pair) + (_ROOM if spare else _LEAST_ROOM)
+            if where == "clear of it" and spare:
                 # The motion to the next cut begins and ends here.
                 needed = max(needed, CLEARANCE)
             if needed - inexact - distance > worst:
@@ -496,9 +628,11 @@ class CutClearance:
                 found = reasons.too_near(where, 1e3 * distance, *pair, 1e3 * needed)
         return worst, found
 
-    def _bitten(self, T_map_tool: Any, point: PruningPoint) -> tuple[float, Reason | None]:
-        """A cane that the blades would cut as well: how far it is in (m), and the reason."""
+    def bitten(self, T_map_tool: Any, point: PruningPoint) -> tuple[float, Reason | None]:
+        """A cane that the blades would cut as well at a pose: how far it is in (m), and the reason."""
         worst, found = 0.0, None
+        if not self._settings.collisions:
+            return worst, found
         canes = self._surroundings.canes_near(T_map_tool.translation, _BESIDE)
         joints = {cane.end for cane, _ in canes}
         for capsule, cane in canes:

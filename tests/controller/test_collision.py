@@ -75,7 +75,8 @@ def test_the_tools_distances_need_no_posture(seed):
     MODEL.set_obstacles(canes(rng, 12, tuple(tool.translation), 0.2))
     MODEL.allow({"cane 3"})
     every = {pair: away for pair, away in by_pair(MODEL.distances(q, 0.2)).items() if pair[1].startswith("cane ")}
-    distances, pairs = MODEL.tool_distances(tool, 0.2)
+    distances, at, pairs = MODEL.tool_distances((ROBOT.pose(anywhere(rng), ROBOT.tool_id), tool), 0.2)
+    distances, pairs = distances[at == 1], [pair for pair, number in zip(pairs, at, strict=True) if number == 1]
     found = {}
     for distance, pair in zip(distances.tolist(), pairs, strict=True):
         found[pair] = min(found.get(pair, np.inf), distance)

@@ -1,12 +1,13 @@
 from dataclasses import replace
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from controller.config import ControllerConfig
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.collision_geometry import TOOL
-from controller.whole_body.obstacle import Obstacle
+from controller.whole_body.obstacle import Axes, Obstacle
 from controller.work.posture_search import CutClearance, CutPlan, PostureSearch, Unreachable, completed
 from controller.work.tries import Tried
 from rolling_panda import messages as m
@@ -18,21 +19,25 @@ from tests.support.points import point
 CONFIG = ControllerConfig()
 SETTINGS = CONFIG.whole_body.hierarchy
 POINT = np.array([0.3, 0.785, 1.169])
+SHARES = np.linspace(0.0, 1.0, 111)
 
 
 def wire(height, y=0.75):
     return Capsule("wire", (-0.2, y, height), (2.0, y, height), 0.004, 0.004)
 
 
-def find(*capsules, tangent=(0.0, 0.1, 1.0), azimuth=None, kind="spur cut", cane=0, tried=()):
-    """A plan for the point, on spur 1 of vine 1, among these."""
+def among(capsules, standing=()):
+    """A search among these and the axes of all standing canes."""
     clearance = CutClearance(RobotModel(), CONFIG.whole_body.hierarchy)
-    message = Obstacles(header=m.Header(0.0, "odom"), capsules=capsules)
-    clearance.update(Received(message, 0.0))
+    clearance.update(Received(Obstacles(header=m.Header(0.0, "odom"), capsules=capsules), 0.0), standing)
+    return PostureSearch(RobotModel(), CONFIG.work, CONFIG.whole_body.joint_margin, clearance)
+
+
+def find(*capsules, tangent=(0.0, 0.1, 1.0), azimuth=None, kind="spur cut", cane=0, tried=(), standing=()):
+    """A plan for the point, on spur 1 of vine 1, among these and the axes of all standing canes."""
     q = np.zeros(12)
     q[ARM_Q] = CONFIG.work.home
-    checks = clearance.too_near, clearance.tool_too_near, clearance.tool_room
-    search = PostureSearch(RobotModel(), CONFIG.work, CONFIG.whole_body.joint_margin, *checks)
+    search = among(capsules, standing)
     along = tuple((np.array(tangent) / np.linalg.norm(tangent)).tolist())
     cut = point("p1", tuple(POINT.tolist()), along, vine=1, spur=1, cane=cane, kind=kind)
     return completed(search.find(cut, q, azimuth, tried))
@@ -149,6 +154,68 @@ def test_an_approach_set_by_a_person_is_kept_and_only_the_blades_lean():
     for plan in (free, beside):
         approach = plan.poses.cut.rotation[:, 2]
         assert np.arctan2(approach @ across / np.linalg.norm(across), approach[1]) == pytest.approx(turned, abs=0.02)
+
+
+def standing(*beside, low=-0.2, high=0.3):
+    """Axes of upright canes, so far beside the point and behind it (m), and of the cane that is cut."""
+    return tuple(
+        tuple(tuple((POINT + [x, y, z]).tolist()) for z in (low, 0.5 * (low + high), high))
+        for x, y in ((0.0, 0.0), *beside)
+    )
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_open_blades_come_in_beside_a_cane_that_is_cut_off_later(side):
+    """It is nothing's obstacle, but it would push the blade that comes in over it."""
+    x, y = 0.028 * side, -0.03
+    lines = standing((x, y))
+    pushes = lines[1][0], lines[1][-1]
+    free, beside = find(standing=standing()), find(standing=lines)
+    assert isinstance(free, CutPlan) and isinstance(beside, CutPlan)
+    assert way_room(free, pushes) < 0.0 < way_room(beside, pushes)
+    np.testing.assert_allclose(beside.poses.cut.translation, POINT)
+
+
+def test_where_canes_push_from_everywhere_the_cut_is_made_all_the_same():
+    around = [(0.04 * np.cos(angle), 0.04 * np.sin(angle)) for angle in np.linspace(0.0, 2.0 * np.pi, 9)]
+    assert isinstance(find(standing=standing(*around)), CutPlan)
+
+
+def test_the_cane_that_is_cut_and_those_far_away_push_nothing():
+    free, beside = find(), find(standing=standing((0.12, 0.0)))
+    np.testing.assert_array_equal(free.q_cut, beside.q_cut)
+
+
+def way_room(plan, cane):
+    """Least distance of the tool from the axis of a cane all along its straight way into the cut (m)."""
+    model = CollisionModel(RobotModel())
+    axis = Axes((Obstacle("met", "cane", *cane, 1e-6),))
+    clear, cut = plan.poses.clear, plan.poses.cut
+    places = [pin.SE3(cut.rotation, clear.translation + s * (cut.translation - clear.translation)) for s in SHARES]
+    return float(model.tool_gaps(places, axis).min())
+
+
+def test_the_blades_tips_pass_nothing_on_the_way_in_that_they_would_touch():
+    """A short spur of another vine beside the way: the tips come past it, the cutter behind them does not reach it."""
+    x, y, z = (POINT + [0.036, -0.035, 0.0]).tolist()
+    stub = Capsule("cordon", (x, y, z - 0.02), (x, y, z + 0.02), 0.003, 0.003)
+    free, past = find(tangent=(0.0, 0.0, 1.0)), find(stub, tangent=(0.0, 0.0, 1.0))
+    assert isinstance(free, CutPlan) and isinstance(past, CutPlan)
+    axis = stub.start, stub.end
+    assert way_room(free, axis) - 0.003 < SETTINGS.blade_distance < way_room(past, axis) - 0.003
+
+
+def test_a_posture_that_something_new_would_touch_does_not_fit_any_more():
+    """A rod where the forearm comes to be at the cut, far from the tool."""
+    plan, model = find(tangent=(0.0, 0.0, 1.0)), CollisionModel(RobotModel())
+    assert isinstance(plan, CutPlan)
+    forearm = model.placed(plan.q_cut)[model.shapes.parts.index("link5")][9:]
+    rod = Capsule("wire", tuple((forearm - 0.01).tolist()), tuple((forearm + 0.01).tolist()), 0.004, 0.004)
+    cut = point("p1", tuple(POINT.tolist()), vine=1, spur=1, cane=0)
+    same, other = (completed(among(around).fit(plan, cut, POINT)) for around in ((), (rod,)))
+    assert same.plan is not None and same.plan.approach == plan.approach and same.lacking is None
+    assert other.lacking is not None and "link" in dict(other.lacking.values)["part"]
+    assert other.plan is None or other.plan.approach != plan.approach
 
 
 def room(plan, cane):

@@ -11,7 +11,7 @@ from controller.config import ControllerConfig
 from controller.motion.tool_motion import PEAK_VELOCITY, ToolMotion
 from controller.planning.cuts import length, shortest, travel_times
 from controller.work.cutting import ApproachSegments
-from controller.work.posture_search import PostureSearch, completed
+from controller.work.posture_search import CutClearance, PostureSearch, completed
 from rolling_panda.model.robot import ARM_Q, RobotModel
 from tests.support.controller_config import controller_config
 from tests.support.points import point
@@ -20,7 +20,8 @@ ROBOT, CONFIG, UP = RobotModel(), ControllerConfig(), np.array([0.0, 0.0, 1.0])
 START = np.zeros(12)
 START[ARM_Q] = CONFIG.work.home
 TOOL = ROBOT.pose(START, ROBOT.tool_id).copy()
-SEARCH = PostureSearch(RobotModel(), CONFIG.work, CONFIG.whole_body.joint_margin)
+CLEARANCE = CutClearance(RobotModel(), CONFIG.whole_body.hierarchy)
+SEARCH = PostureSearch(RobotModel(), CONFIG.work, CONFIG.whole_body.joint_margin, CLEARANCE)
 CUTS = [completed(SEARCH.find(point("p1", (x, 0.75, 1.05)), START)) for x in (0.4, 1.4, 2.4)]
 
 
