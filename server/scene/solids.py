@@ -62,7 +62,9 @@ def build_solids() -> Solids:
     Raises:
         ModelError: A mesh is missing or unreadable.
     """
-    command = (sys.executable, "-c", "from server.scene.mesh_builder import main; main()")
+    # It computes for seconds, for which no real-time priority is meant.
+    first = "from rolling_panda.runtime.scheduling import set_priority; set_priority('perception')"
+    command = (sys.executable, "-c", f"{first}; from server.scene.mesh_builder import main; main()")
     done = subprocess.run(command, capture_output=True, check=False)
     if done.returncode != 0:
         last = done.stderr.decode(errors="replace").strip().splitlines()[-1:]

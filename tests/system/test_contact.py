@@ -128,7 +128,9 @@ def test_in_automatic_work_a_post_that_nobody_saw_stops_it_before_the_tracking_e
 def test_in_automatic_work_a_cane_that_pushes_puts_its_cut_off_and_does_not_stop_the_work() -> None:
     # Its foot is just below the way of the blades, where it is stiff.
     cane = Rod("cane", np.array([0.615, 0.7, 0.93]), np.array([0.615, 0.7, 1.3]), 0.005, 0.004, -1, 9, 9, 0)
-    loop = ContactWorld((cane,), world=only(("cane_modulus",), "field"), canes=(cane,))
+    # Perception has it 30 mm aside: where it is known to be, another approach is taken.
+    told = Rod("cane", cane.start + [0.03, 0.0, 0.0], cane.end + [0.03, 0.0, 0.0], 0.005, 0.004, -1, 9, 9, 0)
+    loop = ContactWorld((cane,), world=only(("cane_modulus",), "field"), canes=(told,))
     loop.work()
     for _ in range(15):
         loop.run(1.0)

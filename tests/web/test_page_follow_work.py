@@ -7,6 +7,8 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from rolling_panda.messages import page as p
+from rolling_panda.messages.perception import SpurDrawing
+from tests.support.drawings import COLUMN
 from tests.support.page_parts import mark, open_screen
 from tests.support.played_page import box_of, until
 from tests.support.played_server import PlayedServer, controller, point
@@ -123,6 +125,27 @@ def test_work_draws_the_cut_under_way_on_its_picture(page: Page, server: PlayedS
     expect(picture.locator(".falls > *").first).to_be_attached()
     head, cut = box_of(page.locator(".work-cut h2")), box_of(picture)
     assert cut["y"] >= head["y"] + head["height"]
+
+
+@pytest.mark.parametrize("row", [12.0, 168.0])
+def test_a_cut_at_the_edge_of_its_picture_is_in_sight_at_work(
+    page: Page, server: PlayedServer, monkeypatch: pytest.MonkeyPatch, row: float
+) -> None:
+    drawn = server.drawing_of
+
+    def at_the_edge(path: str) -> SpurDrawing | None:
+        found = drawn(path)
+        moved = () if found is None else [msgspec.structs.replace(cut, position=(COLUMN, row)) for cut in found.cuts]
+        return None if found is None else msgspec.structs.replace(found, cuts=tuple(moved))
+
+    monkeypatch.setattr(server, "drawing_of", at_the_edge)
+    page.reload()
+    open_screen(page, "work")
+    at_work(server, "p40")
+    picture = page.locator(".work-picture")
+    expect(picture).to_have_attribute("data-shown", "yes")
+    blade, part = box_of(picture.locator(".blade .tips")), box_of(picture)
+    assert part["y"] <= blade["y"] and blade["y"] + blade["height"] <= part["y"] + part["height"]
 
 
 def test_nobody_is_taken_along_while_nothing_is_cut_or_a_point_is_placed(page: Page, server: PlayedServer) -> None:

@@ -147,6 +147,9 @@ export class RpCutPicture extends HTMLElement {
       this.others.append(svg("path", { d: `M0 ${-half}V${half}`, transform: turnOf(cutPlace(other)) }));
     }
     setAttribute(this.stays, "d", cut ? woodPath(cut.axis, along, "stays") : "");
+    // Where only a part of the picture has room, it is the one around the cut.
+    const height = this.picture?.drawing.size[1] ?? 1;
+    this.style.setProperty("--cut", cut ? (cut.position[1] / height).toFixed(3) : "0.5");
     if (!cut) return;
     const width = Math.max(3, 1.25 * cut.thickness);
     for (const path of [woodPath(cut.axis, along, "falls"), ...cut.falls.map(linePath)]) {

@@ -113,7 +113,17 @@ class Movement:
     chance = random.Random(0)
 
     def __init__(
-        self, config, robot_config, queue, lines, run_id, known, method=None, permit=lambda _: None, planned_from=None
+        self,
+        config,
+        robot_config,
+        queue,
+        lines,
+        run_id,
+        known,
+        method=None,
+        permit=lambda _: None,
+        planned_from=None,
+        as_shown=None,
     ):
         self.queue, saturation = queue, Saturation()
         Movement.newest = self
