@@ -144,8 +144,14 @@ def test_a_cut_at_the_edge_of_its_picture_is_in_sight_at_work(
     at_work(server, "p40")
     picture = page.locator(".work-picture")
     expect(picture).to_have_attribute("data-shown", "yes")
-    blade, part = box_of(picture.locator(".blade .tips")), box_of(picture)
-    assert part["y"] <= blade["y"] and blade["y"] + blade["height"] <= part["y"] + part["height"]
+
+    def is_in_sight() -> bool:
+        blades, part = picture.locator(".blade .tips").bounding_box(), box_of(picture)
+        if blades is None:
+            return False
+        return part["y"] <= blades["y"] and blades["y"] + blades["height"] <= part["y"] + part["height"]
+
+    until(page, is_in_sight)
 
 
 def test_nobody_is_taken_along_while_nothing_is_cut_or_a_point_is_placed(page: Page, server: PlayedServer) -> None:

@@ -69,7 +69,7 @@ class Sequence:
     def finish_cut_and_pause(self, why):
         self.ending = why
 
-    def watch(self, bridge, look, now):
+    def watch(self, bridge, look, sight, now):
         return self.blades.watch(bridge, now)
 
     def picture(self, now):
