@@ -79,7 +79,7 @@ def _find(page: Any, album: Keeps) -> None:
     _press(page, "#arm")
     _mode(page, "READY")
     page.locator("[data-cut] button").first.click()
-    page.locator(".work-picture.loaded").wait_for()
+    page.locator('.work-picture[data-shown="yes"]').wait_for()
     _rest(page, 10.0)
     album.take(page, "live-points")
 
