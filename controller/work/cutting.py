@@ -647,10 +647,10 @@ class CloseUp(MovingStage):
 
 
 class Fitting(MovingStage):
-    """Check the cut where the close-up has seen it, among what is known now, before the canes are entered.
+    """Check the way in to where the close-up has seen the cut. The tool is still clear of the canes.
 
-    Where the planned approach has no room there, another one is taken, and a close-up from there checks again. Without
-    one the cut is put off.
+    The newest map counts. Where the planned approach has no room, another one is taken, and a close-up from there
+    checks again. Without one the cut is put off.
     """
 
     phase: m.Phase = "CLOSE_UP"

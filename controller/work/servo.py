@@ -3,8 +3,9 @@
 The pictures are averaged with the close-up before them, each by how much it may be wrong. The camera measures no depth
 from nearer than 0.18 m, so that the last one is taken about a second before the blades have closed: a cane that sways
 is then anywhere on its way, and most likely near the mean of where it was seen. A correction is square to the cane. It
-is bounded by `servo_reach`, so that the blades stay within the margin of what was checked before, and by the speed of
-the last part. Without pictures, and with those that tell nothing or come late, the motion stays as it is.
+is bounded by `servo_reach`, which is the margin of the check between the closing blades, and by the speed of the last
+part. Distances from wood were checked where the close-up has seen the cut; the guards keep them on the way. Without
+pictures, and with those that tell nothing or come late, the motion stays as it is.
 """
 
 import math

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from bridge.sim.camera.config import CameraConfig
-from bridge.sim.camera.frame import camera_frame, survey_place
+from bridge.sim.camera.frame import camera_frame
 from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
@@ -24,17 +24,13 @@ from perception.tracking.picture_shift import PictureShift
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.messages.perception import CloseUpResult
-from rolling_panda.model.robot import RobotModel, configuration
 from rolling_panda.model.wire_values import vector3
+from tests.support.cameras import BASE, MODEL, POSTURE, T_TOOL_CAMERA
 from tests.support.points import point as pruning_point
 
 pytestmark = pytest.mark.long
 
 SEED = 210
-MODEL = RobotModel()
-BASE, POSTURE = survey_place()
-Q = configuration(BASE, POSTURE)
-T_TOOL_CAMERA = MODEL.pose(Q, MODEL.tool_id).inverse() * MODEL.pose(Q, MODEL.camera_id)
 SEES = LabelImageSegmenter()
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bridge.sim.camera.config import CameraConfig
-from bridge.sim.camera.frame import camera_frame, survey_place
+from bridge.sim.camera.frame import camera_frame
 from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
@@ -20,16 +20,12 @@ from perception.tracking.cut_sight import CutFollower
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.messages.perception import CloseUpResult, CutSight
-from rolling_panda.model.robot import RobotModel, configuration
 from rolling_panda.model.wire_values import vector3
+from tests.support.cameras import BASE, MODEL, POSTURE, T_TOOL_CAMERA
 
 pytestmark = pytest.mark.long
 
 SEED = 210
-MODEL = RobotModel()
-BASE, POSTURE = survey_place()
-Q = configuration(BASE, POSTURE)
-T_TOOL_CAMERA = MODEL.pose(Q, MODEL.tool_id).inverse() * MODEL.pose(Q, MODEL.camera_id)
 CONFIG = PerceptionConfig()
 ROW = grow(VineyardConfig(vines=1), SEED)
 CUTS: tuple[RightCut, ...] = tuple(truth.cut for truth in judge(ROW) if truth.cut is not None)[::3]

@@ -3,7 +3,15 @@
 import numpy as np
 
 from bridge.core.picture import Picture
+from bridge.sim.camera.frame import survey_place
 from bridge.sim.vineyard.row import Array, Row
+from rolling_panda.model.robot import RobotModel, configuration
+
+MODEL = RobotModel()
+#: Where base and arm are in a survey, and the camera on the tool (pin.SE3).
+BASE, POSTURE = survey_place()
+_SURVEY = configuration(BASE, POSTURE)
+T_TOOL_CAMERA = MODEL.pose(_SURVEY, MODEL.tool_id).inverse() * MODEL.pose(_SURVEY, MODEL.camera_id)
 
 
 def looking_left(x: float = 0.0, y: float = 0.0, z: float = 1.0) -> Array:
