@@ -8,6 +8,11 @@ from playwright.sync_api import Request, expect
 from tests.support.operator_page import operator_page
 from tests.support.processes.live_robot import LiveRobot
 
+#: More pictures come to be seen while a test looks, so that the page itself tells what was seen at the press.
+NOTE_SEEN_AT_PRESS = """() => addEventListener("keydown", () => {
+    window.seenAtPress = [...document.querySelectorAll('.vine-card[data-seen="yes"]')].map((card) => card.dataset.key);
+}, { capture: true, once: true })"""
+
 pytestmark = [pytest.mark.browser, pytest.mark.alone]
 
 
@@ -31,10 +36,10 @@ def test_what_one_press_accepts_is_what_was_shown_and_one_press_takes_it_back(
         expect(page.locator("#open-vine")).to_be_enabled(timeout=30_000)
         page.keyboard.press("v")
         expect(page.locator("#vine-accept")).to_be_enabled(timeout=30_000)
-        seen = page.locator('.vine-card[data-seen="yes"]').evaluate_all("all => all.map(each => each.dataset.key)")
+        page.evaluate(NOTE_SEEN_AT_PRESS)
         page.keyboard.press("a")
         robot.wait(lambda: sent and {state for state, _ in states().values()} == {"ACCEPTED"}, 20, "all to be accepted")
-        assert {*sent} <= {*seen}
+        assert {*sent} <= {*page.evaluate("window.seenAtPress")}
         assert states() == {name: ("ACCEPTED", digest) for name, digest in sent.items()}
         page.keyboard.press("z")
         robot.wait(lambda: {state for state, _ in states().values()} == {"PROPOSED"}, 20, "all to be proposed")
