@@ -30,7 +30,7 @@ class Player:
     """Playback position in a recording. It has no clock: `now` (s) is the caller's."""
 
     def __init__(self, recording: Recording, name: str, now: float) -> None:
-        """Start playing at the beginning, at its own speed.
+        """Stand at the beginning, to be played at its own speed.
 
         Args:
             recording: The recording.
@@ -48,7 +48,7 @@ class Player:
         self._position, self._now, self._repeated = 0.0, now, float("-inf")
         self._next = 0
         self._sought = False
-        self._playing, self._speed = True, 1.0
+        self._playing, self._speed = False, 1.0
         #: Of the whole recording.
         self.timeline = _timeline(recording)
 

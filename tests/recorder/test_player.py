@@ -48,6 +48,12 @@ def recording(*more: RecordedMessage) -> Recording:
     return Recording(tuple(sorted(messages, key=lambda each: each.at)), True)
 
 
+def playing(*more: RecordedMessage, now: float = 0.0) -> Player:
+    player = Player(recording(*more), "a.mcap", now)
+    player.seek(SeekReplay(playing=True))
+    return player
+
+
 def sequences(messages: Sequence[RecordedMessage]) -> list[int]:
     messages = [each.message() for each in messages if each.topic is topics.JOINTS]
     return [message.sequence for message in messages if isinstance(message, m.JointState)]
@@ -55,12 +61,20 @@ def sequences(messages: Sequence[RecordedMessage]) -> list[int]:
 
 @given(st.lists(st.floats(0.001, 0.9), max_size=30))
 def test_each_message_is_told_once_in_order_as_its_time_comes(steps: list[float]) -> None:
-    player, now, told = Player(recording(), "a.mcap", 50.0), 50.0, []
+    player, now, told = playing(now=50.0), 50.0, []
     for step in steps:
         now += step
         told += sequences(player.step(now))
         assert told == list(range(len(told)))
         assert abs(len(told) - 1 - min(10.0 * player.state.position_s, 100.0)) <= 1.0 + 1e-9
+
+
+def test_it_stands_at_its_beginning_until_it_is_played() -> None:
+    player = Player(recording(), "a.mcap", 0.0)
+    assert player.step(5.0) == []
+    assert (player.state.position_s, player.state.playing) == (0.0, False)
+    player.seek(SeekReplay(playing=True))
+    assert sequences(player.step(5.5)) == [0, 1, 2, 3, 4, 5]
 
 
 def test_a_jump_tells_the_newest_of_each_kind_and_each_process_and_no_old_events() -> None:
@@ -138,7 +152,7 @@ def test_a_recording_without_events_has_an_empty_timeline_and_one_that_was_cut_s
 
 
 def test_it_ends_standing_at_the_end() -> None:
-    player = Player(recording(), "a.mcap", 0.0)
+    player = playing()
     player.step(25.0)
     assert (player.state.position_s, player.state.playing) == (10.0, False)
     player.seek(SeekReplay(position_s=0.0))
@@ -146,5 +160,5 @@ def test_it_ends_standing_at_the_end() -> None:
 
 
 def test_no_command_and_nothing_of_the_server_is_told_again() -> None:
-    player = Player(recording(stop(1.0), heartbeat(1.0, "server")), "a.mcap", 0.0)
+    player = playing(stop(1.0), heartbeat(1.0, "server"))
     assert {each.topic.name for each in player.step(20.0)} == {topics.JOINTS.name}

@@ -46,6 +46,7 @@ def _answers(wire: Transport) -> bool:
 def test_a_server_sees_the_robot_of_the_recording_and_moves_in_it(server: tuple[Replay, Transport]) -> None:
     replay, wire = server
     slot, state, events = wire.slot(topics.JOINTS), wire.slot(topics.REPLAY), wire.feed(topics.EVENT, 10)
+    assert wire.call(topics.SEEK, SeekReplay(playing=True)).ok
     end = time.monotonic() + 1.0
     while time.monotonic() < end:
         replay.step(time.monotonic())

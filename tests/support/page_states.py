@@ -399,27 +399,28 @@ def _report(page: Page, server: PlayedServer) -> None:
         "FAILED_NOT_CUT": reasons.stands_not_cut(reasons.cutter_missed()),
         "UNKNOWN": reasons.interrupted(),
     }
-    server.timeline = a_timeline(time.time() - 600.0)
+    began = time.time() - 600.0
+    server.timeline = a_timeline(began)
     for number, ended in enumerate(outcomes[:4], 1):
         server.cut_pictures[f"c{number}", "before"] = cut_picture(False)
         server.cut_pictures[f"c{number}", "after"] = cut_picture(ended == "DONE")
     cuts = tuple(
         CutReport(
             cut_id=f"c{number}", point_id=f"p{number}", vine=1 + number // 4, spur=1 + number % 4, outcome=outcome,
-            reason=why[outcome], user="Ada", ended_at=MORNING + 60.0 + 5.0 * number, seconds=3.2 + 0.3 * number,
+            reason=why[outcome], user="Ada", ended_at=began + 60.0 + 5.0 * number, seconds=3.2 + 0.3 * number,
             wrong_by="Bob" if number == 2 else "",
         )
         for number, outcome in enumerate(outcomes, 1)
     )  # fmt: skip
     server.report = SessionReport(
-        began_at=MORNING,
-        written_at=MORNING + 600.0,
+        began_at=began,
+        written_at=began + 600.0,
         cuts=cuts,
         cut_count=len(cuts),
         vines=(VineReport(vine=1, done=2, not_cut=1, seconds=11.4), VineReport(vine=2, done=1, unknown=1, seconds=9.1)),
-        refusals=(RefusalReport(at=MORNING + 70.0, user="Bob", asked="Start", reason=reasons.control_held("Ada")),),
+        refusals=(RefusalReport(at=began + 70.0, user="Bob", asked="Start", reason=reasons.control_held("Ada")),),
         refusal_count=1,
-        control=(ControlReport(at=MORNING + 5.0, user="Ada", asked="TakeControl"),),
+        control=(ControlReport(at=began + 5.0, user="Ada", asked="TakeControl"),),
     )
     open_screen(page, "report")
     expect(page.locator("rp-report .cut-card").first).to_be_visible()

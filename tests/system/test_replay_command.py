@@ -56,6 +56,7 @@ def test_a_recording_is_shown_moved_in_and_asked_in_vain(tmp_path: Path) -> None
             assert client.post("/api/replay", json={"position_s": 5.0, "playing": False}).json()["ok"]
             eventually(lambda: client.get("/api/state").json()["replay"]["position_s"] == 5.0)
             eventually(lambda: client.get("/api/state").json()["base"]["x"] == pytest.approx(0.5))
+            eventually(lambda: len(client.get("/api/points").json()["points"]) == 1)
             state = client.get("/api/state").json()
             assert not state["replay"]["playing"]
             assert state["controller"]["mode"] == "READY"

@@ -48,6 +48,15 @@ def test_a_recording_has_a_frame_and_a_name_and_no_control_of_a_robot(page: Page
         expect(page.locator("#stop")).to_be_hidden()
 
 
+def test_it_begins_when_somebody_looks_and_not_again_after_a_pause(page: Page, server: PlayedServer) -> None:
+    play(page, server, position_s=0.0, playing=False)
+    until(page, lambda: asked(server) == [{"playing": True}])
+    play(page, server, position_s=0.0, playing=True)
+    play(page, server, position_s=0.0, playing=False)
+    page.wait_for_timeout(600)
+    assert asked(server) == [{"playing": True}]
+
+
 def test_one_moves_in_it_by_slider_keys_and_speed(page: Page, server: PlayedServer) -> None:
     play(page, server)
     expect(page.locator(".replay-time")).to_contain_text("2:30 of 10:00")

@@ -137,6 +137,7 @@ def test_it_sums_up_and_tells_who_accepted_what_was_refused_and_what_is_left(pag
             re.compile(r"Vine 1\s· spur 2: look whether it was cut – "),
             re.compile(r"Vine 1\s· spur 3: out of the robot's reach – "),
             "Vine 2 · spur 5: no decision yet",
+            re.compile(r"Vine 1\s· spur 3: decide by eye – "),
             re.compile(r"Vine 1\s· spur 4: decide by eye – "),
         ]
     )

@@ -265,7 +265,7 @@ class RpReport extends HTMLElement {
       .filter(({ entry }) => entry.state === "UNKNOWN" || entry.state === "UNREACHABLE" || entry.state === "PROPOSED")
       .map(({ point, entry }) => line(entry.state, point.vine, point.spur, entry.state === "PROPOSED" ? null : entry.reason));
     const sites = (page?.undecided_sites ?? [])
-      .filter((site) => site.needs === "operator")
+      .filter((site) => site.needs !== "nothing")
       // What has no vine is of the whole picture.
       .map((site) => (site.vine === 0 ? reasonText(site.reason) : line("undecided", site.vine, site.spur, site.reason)));
     const lines = [...hanging, ...rows, ...sites];

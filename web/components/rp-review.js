@@ -55,6 +55,8 @@ const LOADING_MS = 2000;
 /** No decision for this time after the cut has changed, and after another picture has come: nobody sees faster (ms). */
 const CHANGED_MS = 700;
 const TURNED_MS = 200;
+/** How long it stands that what is looked at has vanished (ms). */
+const GONE_MS = 3000;
 /** A moved cut is drawn anew by perception within this time (ms). */
 const MOVED_MS = 3000;
 
@@ -162,8 +164,15 @@ class RpReview extends HTMLElement {
     }
     if (found && found.key !== shown?.key) this.turnTo(found);
     else if (found && shown) this.follow(found, shown);
-    else if (shown && key === shown.key) this.gone = true;
+    else if (shown && key === shown.key) this.miss(shown);
     this.drawItem(all);
+  }
+
+  /** What is looked at has vanished: the next comes once that could be read. @param {Item} item */
+  miss(item) {
+    if (this.gone) return;
+    this.gone = true;
+    window.setTimeout(() => this.gone && this.item === item && this.sheet?.hidden !== false && this.goOn(item), GONE_MS);
   }
 
   /** Another item is looked at. @param {Item} item */
@@ -275,7 +284,7 @@ class RpReview extends HTMLElement {
     accept.hidden = row === null;
     if (row) setEnabled(accept, this.whyNotNow() ?? whyNotAccept(row), text(unknown ? "row.was_cut_hint" : "review.accept_hint"));
     again.hidden = row !== null || !item.sites.some((site) => site.position !== null);
-    setEnabled(again, whyNot("LookAgain"), text("sites.look_hint"));
+    setEnabled(again, this.gone ? reason("point_vanished") : whyNot("LookAgain"), text("sites.look_hint"));
   }
 
   /** Why nothing can be decided about this at this moment. @returns {Reason|null} */

@@ -1,7 +1,7 @@
 // The tabs of the screens. A screen is fetched when it is first opened; later it is only shown and hidden.
 
 import { waitingForPerson } from "../js/control/next-step.js";
-import { points } from "../js/state/page-state.js";
+import { pageState, points } from "../js/state/page-state.js";
 import { SCREENS, screen } from "../js/state/screens.js";
 import { drawOn } from "../js/state/signals.js";
 import { counted, text } from "../js/state/texts.js";
@@ -20,7 +20,7 @@ const FETCH = Object.freeze({
 /** How much waits for a person. */
 function badge() {
   const count = element("span", { class: "badge number" });
-  drawOn([points], () => {
+  drawOn([points, pageState], () => {
     const waiting = waitingForPerson();
     count.hidden = waiting === 0;
     setText(count, String(waiting));

@@ -2,6 +2,7 @@
 
 import { countOf } from "../js/control/allowed.js";
 import { isUncertain } from "../js/control/decisions.js";
+import { waitingPlaces } from "../js/control/next-step.js";
 import { cutTime } from "../js/control/order.js";
 import { cuts, cutToShow, vines } from "../js/control/progress.js";
 import { select, selectAndReveal } from "../js/control/selection.js";
@@ -116,12 +117,13 @@ function stateWords({ point, entry, plan }, phase) {
 /** What waits for a person, and the way there. */
 function needs() {
   const link = element("a", { class: "button needs", attributes: { href: "#review" } });
-  drawOn([points], () => {
+  drawOn([points, pageState], () => {
     const unsure = (points.get()?.points ?? []).filter(isUncertain).length;
     const sure = countOf("PROPOSED") - unsure;
-    const places = points.get()?.undecided_sites.filter((site) => site.needs === "operator").length ?? 0;
+    const places = waitingPlaces();
     const all = [
       countOf("UNKNOWN") > 0 ? counted("work.unknown", countOf("UNKNOWN")) : "",
+      countOf("FAILED_NOT_CUT") > 0 ? counted("work.not_cut", countOf("FAILED_NOT_CUT")) : "",
       sure > 0 ? counted("work.sure", sure) : "",
       unsure > 0 ? counted("work.unsure", unsure) : "",
       places > 0 ? counted("work.places", places) : "",

@@ -7,6 +7,7 @@ import { previewOpen } from "./preview.js";
 
 /** @typedef {import("./commands.js").Step} Step */
 /** @typedef {import("../link/messages.js").Interrupted} Interrupted */
+/** @typedef {import("../link/messages.js").Need} Need */
 
 /** @returns {Step|""} Empty for a recording, and after a stop for a viewer. */
 export function nextStep() {
@@ -59,8 +60,15 @@ function withPreview() {
   return told.phase === "ready" && previewOpen.get() ? "approve" : "preview";
 }
 
-/** How many points and places wait for a decision. */
+/** How many spurs without a cut wait for a decision. While the robot surveys, another look may settle some. */
+export function waitingPlaces() {
+  const isSurveying = pageState.get()?.controller?.phase === "SURVEY";
+  const waits = (/** @type {Need} */ needs) => needs === "operator" || (needs === "another look" && !isSurveying);
+  const sites = (points.get()?.undecided_sites ?? []).filter(({ vine, needs }) => vine > 0 && waits(needs));
+  return new Set(sites.map(({ vine, spur }) => `${vine} ${spur}`)).size;
+}
+
+/** How many cuts and places wait for a decision. */
 export function waitingForPerson() {
-  const places = points.get()?.undecided_sites.filter((site) => site.needs === "operator").length ?? 0;
-  return countOf("PROPOSED") + countOf("UNKNOWN") + places;
+  return countOf("PROPOSED") + countOf("UNKNOWN") + countOf("FAILED_NOT_CUT") + waitingPlaces();
 }

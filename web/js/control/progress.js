@@ -1,6 +1,6 @@
 // How far the work on the row is: vine by vine, and the time that is left.
 
-import { points } from "../state/page-state.js";
+import { pageState, points } from "../state/page-state.js";
 
 /** @typedef {import("../link/messages.js").PagePoint} PagePoint */
 /**
@@ -47,12 +47,51 @@ export function vines() {
   return [...found.values()].sort((a, b) => a.vine - b.vine);
 }
 
-/** Time for what is still to be cut (s); null where it is not known, and 0 where nothing is. */
+// --- the time that is left ---
+
+/** The pace is that of so many cuts. */
+const RECENT = 6;
+/** Planned times of cuts that are not made yet, by point (s). @type {Map<string, number>} */
+const planned = new Map();
+/** Planned and true times of the newest cuts (s). @type {(readonly [number, number])[]} */
+let made = [];
+/** When the robot began with the cut under way, by the controller's clock (s); NaN where it is at none. */
+let begun = NaN;
+
+/** Learn from each cut that is made while the page is open. A pause is no part of any. */
+function learnPace() {
+  const controller = pageState.get()?.controller;
+  const stamp = controller?.header.stamp ?? NaN;
+  if (controller?.mode !== "AUTO") begun = NaN;
+  else if (!(begun <= stamp)) begun = stamp;
+  for (const { point, entry, plan } of points.get()?.points ?? []) {
+    const name = point.point_id;
+    if (AHEAD.has(entry.state)) {
+      if (plan?.rollout) planned.set(name, plan.rollout.ends_s - plan.rollout.begins_s);
+      continue;
+    }
+    const time = planned.get(name);
+    planned.delete(name);
+    if (time === undefined || entry.state !== "DONE" || Number.isNaN(begun)) continue;
+    made = [...made, /** @type {const} */ ([time, stamp - begun])].slice(-RECENT);
+    begun = stamp;
+  }
+}
+points.subscribe(learnPace);
+pageState.subscribe(learnPace);
+
+/** True against planned time of the newest cuts; 1 before the first. */
+function pace() {
+  const sum = (/** @type {0|1} */ which) => made.reduce((total, each) => total + each[which], 0);
+  return sum(0) > 0 ? sum(1) / sum(0) : 1;
+}
+
+/** Time for what is still to be cut (s), at the pace of the newest cuts; null where it is not known, and 0 where nothing is. */
 export function timeLeft() {
   const ahead = cuts().filter((row) => AHEAD.has(row.entry.state));
   const times = ahead.flatMap(({ plan }) => (plan?.rollout ? [plan.rollout.ends_s - plan.rollout.begins_s] : []));
   const known = times.reduce((sum, each) => sum + each, 0);
   if (ahead.length === 0) return 0;
   // A cut that is not rolled out yet counts as the mean of the others.
-  return times.length > 0 ? (known * ahead.length) / times.length : null;
+  return times.length > 0 ? (pace() * known * ahead.length) / times.length : null;
 }

@@ -49,6 +49,8 @@ export function initReplay() {
     document.title = text("replay.document", { name: state.replay.name });
     void import("../../components/rp-replay.js");
     window.addEventListener("keydown", press);
+    // It waits at its beginning until somebody looks.
+    if (!state.replay.playing && state.replay.position_s === 0) seek({ playing: true });
     // A focused button would be clicked on keyup.
     window.addEventListener("keyup", (event) => event.key === " " && isButton(event) && event.preventDefault());
   });
