@@ -177,3 +177,14 @@ def test_resume_starts_no_work_where_something_else_was_interrupted_or_comes_fir
     page.locator(".next #resume").click()
     page.wait_for_timeout(300)
     assert asked(server) == ["/api/resume"]
+
+
+def test_why_the_work_has_ended_is_not_told_any_more_once_there_is_more_to_cut(
+    page: Page, server: PlayedServer
+) -> None:
+    ended = reasons.work_done_but(1.0)
+    server.controller = msgspec.structs.replace(mode("READY"), reason=ended)
+    show(server, WAITS)
+    expect(page.locator(".next-why")).to_have_text(text_of(ended))
+    show(server, TAKEN)
+    expect(page.locator(".next-why")).to_be_empty()

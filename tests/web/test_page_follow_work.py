@@ -167,23 +167,21 @@ def test_nobody_is_taken_along_while_nothing_is_cut_or_a_point_is_placed(page: P
 def test_the_time_left_learns_from_the_cuts_that_are_made(page: Page, server: PlayedServer) -> None:
     def tells(stamp: float, *, done: int, mode: m.Mode = "AUTO") -> None:
         server.controller = controller(mode, phase="APPROACH", header=m.Header(stamp=stamp))
+        page.wait_for_timeout(600)
         states: list[m.PointState] = ["DONE"] * done + ["ACCEPTED"] * (4 - done)
         # Each is planned to take 3.5 s.
         show(server, *(planned(point(k, state, spur=k), 1) for k, state in enumerate(states, 1)))
 
     left = page.locator("rp-vines p")
     tells(100.0, done=0)
-    expect(left).to_have_text("0 of 4 cut · 14 s left")
-    page.wait_for_timeout(600)
+    expect(left).to_have_text("0 of 4 done · 14 s left")
     tells(107.0, done=1)
-    expect(left).to_have_text("1 of 4 cut · 21 s left")
+    expect(left).to_have_text("1 of 4 done · 21 s left")
     # A pause is no part of a cut.
     tells(108.0, done=1, mode="PAUSED")
-    page.wait_for_timeout(600)
     tells(200.0, done=1)
-    page.wait_for_timeout(600)
     tells(207.0, done=2)
-    expect(left).to_have_text("2 of 4 cut · 14 s left")
+    expect(left).to_have_text("2 of 4 done · 14 s left")
 
 
 def test_what_waits_for_a_person_is_the_same_number_everywhere(page: Page, server: PlayedServer) -> None:
@@ -198,7 +196,7 @@ def test_what_waits_for_a_person_is_the_same_number_everywhere(page: Page, serve
     expect(page.locator('[data-tab="review"] .badge')).to_have_text("4")
     open_screen(page, "work")
     expect(page.locator("#needs-you")).to_have_text("4 need you")
-    expect(page.locator("rp-work .needs")).to_have_text("1 not cut · 1 sure cut to decide · 2 places to decide")
+    expect(page.locator("rp-work .needs")).to_have_text("1 not cut · 1 to review · 2 places to decide")
     # What the camera may still settle by itself waits for nobody yet.
     server.controller = controller("AUTO", phase="SURVEY")
     expect(page.locator("#needs-you")).to_have_text("3 need you")

@@ -60,7 +60,7 @@ class RpBar extends HTMLElement {
       this.draw();
       const step = nextStep();
       const refused = step && whyNotStep(step);
-      setText(why, reasonText(refused || pageState.get()?.controller?.reason));
+      setText(why, reasonText(refused || modeReason()));
       why.title = why.textContent ?? "";
       show.hidden = whyNoPreview() !== null && !hasPreview();
       show.setAttribute("aria-expanded", String(previewOpen.get()));
@@ -144,6 +144,12 @@ function labelOf(step) {
     default:
       return text(`command.${step}`);
   }
+}
+
+/** Why the robot is as it is; not what ended the work before, once there is more to cut. */
+function modeReason() {
+  const controller = pageState.get()?.controller;
+  return controller?.mode === "READY" && countOf("ACCEPTED") > 0 ? null : controller?.reason;
 }
 
 /** Was a survey interrupted? */
