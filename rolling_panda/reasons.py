@@ -2701,7 +2701,7 @@ def work_done() -> None:
 
 @_reason("warning", "move the robot, or turn the approach")
 def work_done_but(unreachable: float) -> None:
-    """No accepted point is left that can be reached; cannot be reached: {unreachable:.0f}."""
+    """All that can be reached is cut; out of reach: {unreachable:.0f}."""
 
 
 @_reason("warning", "")
