@@ -41,12 +41,12 @@ class CaneTouches:
 
         Args:
             q: Configuration (12).
-            rods: The row's, with their numbers; only canes count.
+            rods: The row's, with their numbers; only canes count, without their laterals.
             revision: Of the row; the rods are read anew when it changes.
         """
         if revision != self._revision:
             self._revision = revision
-            canes = {f"{number}": rod for number, rod in rods if rod.kind == "cane"}
+            canes = {f"{number}": rod for number, rod in rods if rod.kind == "cane" and rod.organ < 0}
             self._canes = {name: (rod.vine, rod.spur, rod.cane) for name, rod in canes.items()}
             self._model.set_obstacles(
                 [

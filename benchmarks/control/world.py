@@ -39,6 +39,9 @@ DISTURBANCES: dict[str, tuple[str, ...]] = {
     "blades": ("blade_failures",),
     "elastic canes": ("cane_modulus",),
     "hanging canes": ("hanging",),
+    "lateral shoots": ("laterals",),
+    "tendrils and leaves": ("tendrils", "leaves"),
+    "drooping canes": ("drooping",),
 }
 
 

@@ -32,7 +32,11 @@ def blocked_by(row: Row, cut: RightCut) -> Blocker:
     canes = [
         rod
         for _, rod in row.standing()
-        if rod.kind in ("cane", "node") and (rod.vine, rod.spur, rod.cane) != cane and _near(rod, cut)
+        if rod.kind in ("cane", "node")
+        # Laterals may be cut along.
+        and rod.organ < 0
+        and (rod.vine, rod.spur, rod.cane) != cane
+        and _near(rod, cut)
     ]
     hard = [rod for _, rod in row.standing() if rod.kind in ("wire", "hose", "post") and _near(rod, cut)]
     places = cut.least + np.linspace(0.0, 1.0, _PLACES)[:, None] * (cut.most - cut.least)

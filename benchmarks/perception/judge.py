@@ -159,9 +159,9 @@ class RowJudge:
 
 
 def nearest_rod(row: Row, position: Array) -> tuple[float, Rod]:
-    """Distance (m) and rod of the spurs' and canes' wood whose axis is nearest to a place (3, m)."""
+    """Distance (m) and rod of the spurs' and canes' wood whose axis is nearest to a place (3, m); laterals are none."""
     distance, _, rod = min(
-        ((_distance(rod, position), index, rod) for index, rod in row.standing() if rod.spur >= 0),
+        ((_distance(rod, position), index, rod) for index, rod in row.standing() if rod.spur >= 0 and rod.organ < 0),
         key=lambda found: found[:2],
     )
     return distance, rod

@@ -122,7 +122,7 @@ def look_again(points: Sequence[m.PruningPoint], row: Row, eye: CloseCamera, opi
         afterwards = eye.look(after, T_odom_camera, point)
         if afterwards.finding != "severed":
             afterwards = eye.look(after, T_odom_camera, point)
-        into.afterwards.append((afterwards.finding, bool(cut.severed)))
+        into.afterwards.append((afterwards.finding, any(item.rod.organ < 0 for item in cut.severed)))
 
 
 def summarise_looks(looks: Looks) -> dict[str, Figure]:

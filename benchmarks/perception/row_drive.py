@@ -21,6 +21,7 @@ from bridge.sim.robot.robot import SimulatedRobot
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
 from bridge.sim.world.config import WorldConfig
+from bridge.sim.world.growth import overgrown
 from rolling_panda import messages as m
 from rolling_panda.config import load_section
 from rolling_panda.messages.robot import CameraFrame
@@ -67,7 +68,8 @@ def row_drive(
     config = load_section(path, "bridge", BridgeConfig)
     vineyard = load_section(path, "vineyard", VineyardConfig)
     spacing = vineyard.vine_spacing
-    row = grow(VineyardConfig(vines=math.ceil((metres + 2.0) / spacing) + 1, vine_spacing=spacing), seed)
+    grown = grow(VineyardConfig(vines=math.ceil((metres + 2.0) / spacing) + 1, vine_spacing=spacing), seed)
+    row = overgrown(grown, world, seed)
     renderer = InlineRenderer(load_section(path, "camera", CameraConfig), seed, world)
     robot, model = SimulatedRobot(config, row, renderer, None, world, seed), RobotModel()
     odometer = Odometer(model.drive, config.odometry, STEP_S, seed)

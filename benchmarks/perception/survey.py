@@ -31,6 +31,7 @@ from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
 from bridge.sim.world.config import CALM, PRESETS, WorldConfig, only
+from bridge.sim.world.growth import overgrown
 from controller.config import WorkConfig
 from perception.config import PerceptionConfig, RuleConfig
 from perception.pipeline import Perception
@@ -44,6 +45,8 @@ ROW_VINES, STEP = 3, 0.125
 SPEED = 0.25
 #: What disturbs the colour picture, for `--light`.
 LIGHT = ("sunlight", "glare", "wet", "exposure")
+#: What grows and hangs on the canes, for `--shoots`.
+SHOOTS = ("laterals", "tendrils", "leaves", "drooping")
 #: Nodes that stay, by the kind of cut.
 KEPT = {"spur cut": 2, "cane cut": 8}
 #: The camera stands so far ahead of the base in the survey posture (m), and begins before the first trunk.
@@ -94,11 +97,11 @@ def survey_row(
         gallery: Folder for pictures of wrong points.
         looks: Takes what a second look at each point comes to; None leaves it at the survey.
         step: Way between two frames (m).
-        world: Disturbances of the camera.
+        world: Disturbances of row and camera.
     """
     guyot = perception.config.rule.system == "guyot"
     config = VineyardConfig(vines=vines, training="guyot" if guyot else "cordon")
-    row = grow(config, seed)
+    row = overgrown(grow(config, seed), world, seed)
     camera = Camera(camera_config, seed, world)
     opinion = GuyotJudge(row, seed) if guyot else RowJudge(row, seed)
     first = config.first_vine_x - config.vine_spacing / 2
@@ -213,6 +216,12 @@ def main(argv: Sequence[str]) -> int:
     parser.add_argument(
         "--light", choices=tuple(PRESETS), default="calm", help="sun, glare, wet bark and blur of a preset"
     )
+    parser.add_argument(
+        "--shoots",
+        choices=tuple(PRESETS),
+        default="calm",
+        help="laterals, tendrils, leaves, drooping canes of a preset",
+    )
     parser.add_argument("--gallery", type=Path, metavar="DIR", help="put pictures of wrong points here")
     words = parser.parse_args(argv)
     if words.seed < 0 or words.vines < 1:
@@ -223,13 +232,14 @@ def main(argv: Sequence[str]) -> int:
     if words.growth:
         return _growth(words)
     looks = Looks() if words.looks == "two" else None
+    grown = {knob: getattr(PRESETS[words.shoots], knob) for knob in SHOOTS}
+    world = msgspec.structs.replace(only(LIGHT, words.light), **grown)
     for number, done in enumerate(range(0, words.vines, ROW_VINES)):
         segmenter = Confusion(choose_segmenter(words.segmenter, words.weights), survey.confusion)
         rule = RuleConfig(system=words.training_system)
         perception = Perception(PerceptionConfig(fuse=words.fuse, rule=rule), segmenter, model)
         seed, vines = words.seed + number, min(ROW_VINES, words.vines - done)
         before = len(survey.points)
-        world = only(LIGHT, words.light)
         survey_row(seed, vines, perception, model, CameraConfig(), survey, words.gallery, looks, words.step, world)
         new = survey.points[before:]
         print(f"seed {seed}: {vines} vines, {len(new)} points, {sum(p.right for p in new)} right", flush=True)
@@ -244,6 +254,7 @@ def main(argv: Sequence[str]) -> int:
         "segmenter": words.segmenter,
         "step_m": words.step,
         "light": words.light,
+        "shoots": words.shoots,
         "fuse": words.fuse,
         "training_system": words.training_system,
         "looks": words.looks,

@@ -16,6 +16,7 @@ from bridge.sim.robot.trace import TraceWriter
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
 from bridge.sim.world.config import load_world
+from bridge.sim.world.growth import overgrown
 from rolling_panda.bounds import wider
 from rolling_panda.calibration.file import Calibrated
 from rolling_panda.config import RobotConfig, load_section
@@ -85,9 +86,9 @@ def simulated_robot(
         ConfigError: A section is wrong, or the trace cannot be written.
     """
     config = load_section(config_path, "bridge", BridgeConfig)
-    row = grow(load_section(config_path, "vineyard", VineyardConfig), seed)
-    lens = load_section(config_path, "camera", CameraConfig)
     world = load_world(config_path)
+    row = overgrown(grow(load_section(config_path, "vineyard", VineyardConfig), seed), world, seed)
+    lens = load_section(config_path, "camera", CameraConfig)
     writer = None if trace is None else TraceWriter(trace)
     renderer: CameraRenderer
     if camera == "inline":

@@ -7,13 +7,14 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
-from bridge.sim.vineyard.row import Rod, Row
+from bridge.sim.vineyard.row import Array, Row
 from rolling_panda.messages.types import WOOD_CLASSES
 
 Floats = NDArray[np.float32]
 Indices = NDArray[np.int32]
-#: Radius from which a rod has the finer cross-section (m), and the sides of either.
-_THICK, _SIDES_THIN, _SIDES_THICK = 0.012, 8, 16
+_CLASS = {kind: number for number, kind in enumerate(WOOD_CLASSES)}
+#: Radius from which a rod has the finer cross-section (m), the sides of either, and those of what grows on canes.
+_THICK, _SIDES_THIN, _SIDES_THICK, _SIDES_ORGAN = 0.012, 8, 16, 5
 
 
 @dataclass(frozen=True)
@@ -38,21 +39,25 @@ class RodMesh:
         self.start = np.zeros((count, 3), np.float32)
         self.axis = np.zeros((count, 3), np.float32)
         self.width = np.zeros(count, np.float32)
-        for index, rod in standing:
-            self.kind[index] = WOOD_CLASSES.index(rod.kind)
-            self.start[index] = rod.start
-            self.width[index] = rod.start_radius + rod.end_radius
-            self.axis[index] = (rod.end - rod.start) / max(float(np.linalg.norm(rod.end - rod.start)), 1e-9)
-        thin = [(i, rod) for i, rod in standing if max(rod.start_radius, rod.end_radius) < _THICK]
-        thick = [(i, rod) for i, rod in standing if max(rod.start_radius, rod.end_radius) >= _THICK]
+        rods = [rod for _, rod in standing]
+        numbers = np.array([index for index, _ in standing], np.int32)
+        start, end = (np.array([getattr(rod, name) for rod in rods]).reshape(-1, 3) for name in ("start", "end"))
+        radius = np.array([(rod.start_radius, rod.end_radius) for rod in rods]).reshape(-1, 2)
+        self.kind[numbers] = [_CLASS[rod.kind] for rod in rods]
+        self.start[numbers] = start
+        self.width[numbers] = radius.sum(axis=1)
+        self.axis[numbers] = (end - start) / np.maximum(np.linalg.norm(end - start, axis=1, keepdims=True), 1e-9)
+        sides = np.where(radius.max(axis=1, initial=0.0) < _THICK, _SIDES_THIN, _SIDES_THICK)
+        sides[[rod.organ >= 0 for rod in rods]] = _SIDES_ORGAN
         vertices, faces, owner, offset = [], [], [], 0
-        for group, sides in ((thin, _SIDES_THIN), (thick, _SIDES_THICK)):
-            if group:
-                points, triangles = tubes([rod for _, rod in group], sides)
+        for each in (_SIDES_THIN, _SIDES_THICK, _SIDES_ORGAN):
+            group = np.flatnonzero(sides == each)
+            if len(group):
+                points, triangles = tubes(start[group], end[group], radius[group], each)
                 vertices.append(points)
                 faces.append(triangles + offset)
                 offset += len(points)
-                owner.append(np.repeat(np.array([i for i, _ in group], np.int32), len(triangles) // len(group)))
+                owner.append(np.repeat(numbers[group], len(triangles) // len(group)))
         self._owner = np.concatenate(owner) if owner else np.zeros(0, np.int32)
         self._scene = EmbreeScene() if owner else None
         if self._scene is not None:
@@ -78,14 +83,19 @@ class RodMesh:
         return blocked
 
 
-def tubes(rods: list[Rod], sides: int) -> tuple[Floats, Indices]:
+def tubes(start: Array, end: Array, radius: Array, sides: int) -> tuple[Floats, Indices]:
     """Closed tapered prisms: vertices (N·(2·sides + 2), 3) and faces, the same number for each rod, rod by rod.
 
     A regular polygon is narrower than its circle seen from most sides, so the prism is wider by as much: its mean
     width is the rod's. The ends bulge by a third of the radius.
+
+    Args:
+        start: Of the axes (N×3, m).
+        end: Of the axes (N×3, m).
+        radius: At either end (N×2, m).
+        sides: Of each prism.
     """
-    start, end = np.array([rod.start for rod in rods]), np.array([rod.end for rod in rods])
-    radius = np.array([[rod.start_radius, rod.end_radius] for rod in rods]) * (np.pi / sides) / np.sin(np.pi / sides)
+    radius = radius * (np.pi / sides) / np.sin(np.pi / sides)
     axis = (end - start) / np.maximum(np.linalg.norm(end - start, axis=1, keepdims=True), 1e-9)
     helper = np.where(np.abs(axis[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
     across = np.cross(axis, helper)
@@ -113,5 +123,5 @@ def tubes(rods: list[Rod], sides: int) -> tuple[Floats, Indices]:
             np.stack([k + sides, following + sides, second], 1),
         ]
     )
-    offsets = np.arange(len(rods))[:, None, None] * (2 * sides + 2)
+    offsets = np.arange(len(start))[:, None, None] * (2 * sides + 2)
     return vertices.reshape(-1, 3).astype(np.float32), (faces + offsets).reshape(-1, 3).astype(np.int32)

@@ -10,7 +10,8 @@ from bridge.sim.camera.mesh import Floats, Indices
 from rolling_panda.messages.types import WOOD_CLASSES, WoodClass
 
 _BASE: dict[WoodClass, tuple[float, float, float]] = {
-    "background": (0.0, 0.0, 0.0),
+    # Of the row itself: tendrils and old leaves.
+    "background": (128.0, 92.0, 56.0),
     "ground": (106.0, 103.0, 62.0),
     "post": (140.0, 118.0, 92.0),
     "trunk": (84.0, 66.0, 52.0),

@@ -137,8 +137,11 @@ def close_blades(row: Row, T_world_tool: Array, config: BridgeConfig) -> CutResu
 
 
 def wood_in_plane(row: Row, T_world_tool: Array) -> Array:
-    """Where soft wood crosses the blade plane (N×2, m): the tool's x and z, the nearest to its origin first."""
-    soft = [rod for _, rod in row.standing() if rod.kind in _SOFT]
+    """Where soft wood crosses the blade plane (N×2, m): the tool's x and z, the nearest to its origin first.
+
+    Lateral shoots do not count.
+    """
+    soft = [rod for _, rod in row.standing() if rod.kind in _SOFT and rod.organ < 0]
     if not soft:
         return np.zeros((0, 2))
     R, p = T_world_tool[:3, :3], T_world_tool[:3, 3]

@@ -427,7 +427,7 @@ class SimulatedRobot:
                     "point": item.point.tolist(),
                 }
                 for item in result.severed
-                if not item.rod.hanging
+                if not item.rod.hanging and item.rod.organ < 0
             ],
         }
 

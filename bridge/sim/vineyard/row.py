@@ -29,6 +29,7 @@ class Rod:
         spur: Spur on the vine, -1 for none.
         cane: Cane on the spur, -1 for none.
         hanging: Severed, and held by the wires.
+        organ: Number of a lateral shoot, tendril or old leaf on the cane; -1 for the cane itself.
     """
 
     kind: WoodClass
@@ -41,6 +42,7 @@ class Rod:
     spur: int = -1
     cane: int = -1
     hanging: bool = False
+    organ: int = -1
 
     def at(self, fraction: float) -> tuple[Array, float]:
         """Point on the axis (3, m) and radius (m) at a fraction 0…1 of the length."""

@@ -5,6 +5,9 @@ one cut beyond it, and shorten it past its second node. The basal bud is not cou
 
 Guyot: the lower cane of the spur is cut to two nodes and becomes the next spur, the upper one is shortened to the
 fruiting nodes, and last year's cane is removed in one cut beyond the head.
+
+Lateral shoots are pruned away on all canes: to cut one is neither right nor harmful. Their rods come after those of all
+canes and are no nodes, so that a cane is judged as without them.
 """
 
 from dataclasses import dataclass

@@ -2,7 +2,8 @@
 
 A cane is a beam that is held at its base. What touches it displaces it there. Its force is that of the beam with a load
 at this place, 3 E I / L³ times the displacement, up to the load at which the wood yields. A cane that is let go springs
-back. The canes that the camera sees, and that the blades cut, are the unbent ones.
+back. The canes that the camera sees, and that the blades cut, are the unbent ones. A lateral shoot is a beam that is
+held where it grows; its cane stands still. Tendrils and leaves give way to all.
 """
 
 import math
@@ -21,8 +22,8 @@ _SHORTEST = 0.05
 _BACK_S, _LOOK_S = 0.05, 0.02
 #: Canes within this distance of a part are near (m): nothing moves as far between two looks.
 _NEAR = 0.08
-#: Numbers of a cane: vine, spur, cane.
-_Numbers = tuple[int, int, int]
+#: Numbers of a cane, or of a lateral shoot on it: vine, spur, cane, organ.
+_Numbers = tuple[int, int, int, int]
 
 
 @dataclass(frozen=True)
@@ -64,31 +65,42 @@ class Canes:
         if row.revision != self._revision:
             self._read(row)
         if self._steps % self._every == 0:
-            self._near = np.flatnonzero((self._gaps(centers, np.arange(len(self._start)))[0] < _NEAR).any(axis=0))
+            around = self._around(centers)
+            self._near = around[(self._gaps(centers, around)[0] < _NEAR).any(axis=0)]
         self._steps += 1
         for bent in self._bent.values():
             bent *= self._relax
         return self._touch(centers) if len(self._near) else []
 
     def _read(self, row: Row) -> None:
-        """Rods of the canes, with the length of cane below each."""
+        """Rods of canes and laterals, with the length of the same below each."""
         self._revision, self._steps = row.revision, 0
-        rods = [(index, rod) for index, rod in row.standing() if rod.cane >= 0]
-        self._numbers = [(rod.vine, rod.spur, rod.cane) for _, rod in rods]
+        rods = [(index, rod) for index, rod in row.standing() if rod.cane >= 0 and rod.kind != "background"]
+        self._numbers = [(rod.vine, rod.spur, rod.cane, rod.organ) for _, rod in rods]
         thick: dict[_Numbers, float] = {}
         below: list[float] = []
-        beyond: dict[int, float] = {}
+        beyond: dict[tuple[int, int], float] = {}
         for (index, rod), numbers in zip(rods, self._numbers, strict=True):
             thick.setdefault(numbers, rod.start_radius)
-            below.append(beyond.get(rod.parent, 0.0))
-            beyond[index] = below[-1] + float(np.linalg.norm(rod.end - rod.start))
+            below.append(beyond.get((rod.parent, rod.organ), 0.0))
+            beyond[index, rod.organ] = below[-1] + float(np.linalg.norm(rod.end - rod.start))
         self._start = np.array([rod.start for _, rod in rods]).reshape(-1, 3)
         self._along = np.array([rod.end for _, rod in rods]).reshape(-1, 3) - self._start
         self._square = np.maximum((self._along**2).sum(axis=1), 1e-12)
         self._radius = np.array([max(rod.start_radius, rod.end_radius) for _, rod in rods])
+        ends = np.stack([self._start, self._start + self._along])
+        self._low, self._high = ends.min(axis=0) - self._radius[:, None], ends.max(axis=0) + self._radius[:, None]
         self._below = np.array(below)
         self._base = np.array([thick[numbers] for numbers in self._numbers])
         self._bent = {numbers: bent for numbers, bent in self._bent.items() if numbers in thick}
+
+    def _around(self, centers: Array) -> Any:
+        """Rods that could be near: those beside the box of the parts, or all while any is bent."""
+        if self._bent:
+            return np.arange(len(self._start))
+        reach = self._radii[:, None] + _NEAR
+        low, high = (centers - reach).min(axis=0), (centers + reach).max(axis=0)
+        return np.flatnonzero(((self._high > low) & (self._low < high)).all(axis=1))
 
     def _gaps(self, centers: Array, rods: Any) -> tuple[Array, Array, Array]:
         """Gaps (n×k), offsets of the parts from the axes (n×k×3, m) and places on the rods 0…1 (n×k)."""

@@ -50,6 +50,10 @@ class WorldConfig(Struct, frozen=True, forbid_unknown_fields=True):
             the force that the diameter needs.
         cane_modulus: Young's modulus of canes (GPa), by which they push back and bend; 0 lets them give way to all.
         hanging: Fraction of severed canes that do not fall but hang in the wires, a little beside where they stood.
+        laterals: Fraction of nodes with a lateral shoot, 3 to 30 cm long and 2 to 5 mm thick.
+        tendrils: Fraction of nodes with a tendril, which holds the nearest wire.
+        leaves: Fraction of nodes with an old leaf.
+        drooping: Fraction of canes that are out of the wires, bent to one side and over others.
     """
 
     preset: Literal["calm", "field", "storm"] = "calm"
@@ -75,6 +79,10 @@ class WorldConfig(Struct, frozen=True, forbid_unknown_fields=True):
     blade_failures: Share = 0.0
     cane_modulus: Annotated[float, Meta(ge=0.0, le=20.0)] = 0.0
     hanging: Share = 0.0
+    laterals: Share = 0.0
+    tendrils: Share = 0.0
+    leaves: Share = 0.0
+    drooping: Share = 0.0
 
 
 CALM = WorldConfig()
@@ -105,6 +113,10 @@ PRESETS: dict[str, WorldConfig] = {
         blade_failures=0.02,
         cane_modulus=6.5,
         hanging=0.1,
+        laterals=0.10,
+        tendrils=0.15,
+        leaves=0.02,
+        drooping=0.10,
     ),
     "storm": WorldConfig(
         preset="storm",
@@ -130,6 +142,10 @@ PRESETS: dict[str, WorldConfig] = {
         blade_failures=0.10,
         cane_modulus=8.0,
         hanging=0.3,
+        laterals=0.30,
+        tendrils=0.40,
+        leaves=0.08,
+        drooping=0.30,
     ),
 }
 
