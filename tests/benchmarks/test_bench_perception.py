@@ -14,7 +14,10 @@ from bridge.sim.camera.config import CameraConfig
 from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
+from bridge.sim.vineyard.row import Rod, Row
 from bridge.sim.vineyard.truth import judge
+from bridge.sim.world.config import WorldConfig
+from bridge.sim.world.growth import overgrown
 from controller.config import ControllerConfig
 from perception.config import PerceptionConfig
 from perception.pipeline import Perception
@@ -65,6 +68,23 @@ def test_a_point_on_another_cane_or_beside_the_wood_is_wrong():
     assert not judged.right_cane and not judged.right and judged.along_error is None
     aside = RowJudge(ROW, 11).point(point(truth.cut.best + [0.0, 0.02, 0.0], truth.cut.tangent))
     assert not aside.right
+
+
+def test_what_grows_on_canes_changes_no_opinion_and_a_point_on_a_lateral_is_wrong():
+    grown = overgrown(ROW, WorldConfig(laterals=1.0, tendrils=1.0, leaves=1.0), 11)
+    bare, full = RowJudge(ROW, 11), RowJudge(grown, 11)
+    for truth in TRUTHS[:4]:
+        here = point(truth.cut.best, truth.cut.tangent)
+        assert full.point(here) == bare.point(here)
+        assert full.blocked(truth.vine, truth.spur) == bare.blocked(truth.vine, truth.spur)
+    truth, other = TRUTHS[:2]
+    beside = truth.cut.best + [0.0, 0.02, 0.0]
+    numbers = truth.cut.rod - 1, truth.vine, truth.spur, truth.keeper
+    lateral = Rod("cane", ROW.rods[truth.cut.rod].start, beside, 0.002, 0.001, *numbers, organ=0)
+    assert not RowJudge(Row((*ROW.rods, lateral)), 11).point(point(beside, truth.cut.tangent)).right
+    cut, numbers = truth.cut, (other.cut.rod, other.vine, other.spur, other.keeper)
+    through = Rod("cane", cut.least, cut.most, 0.002, 0.001, *numbers, organ=0)
+    assert RowJudge(Row((*ROW.rods, through)), 11).blocked(truth.vine, truth.spur) == "", "the blades may cut it along"
 
 
 def test_what_hangs_behind_a_board_is_hidden_and_what_is_before_it_is_clear():

@@ -141,8 +141,8 @@ def _tendril(node: Rod, side: Array, wires: list[Rod], rng: np.random.Generator)
         if 0.0 <= ahead <= float((wire.end - wire.start) @ along) and float(np.linalg.norm(on_wire - point)) < _GRASP:
             between = (point + on_wire) / 2 + rng.normal(0.0, 0.01, 3)
             around = wire.start_radius + _TENDRIL_RADIUS[0]
-            points = np.array([point, between, on_wire, on_wire + _WOUND * along])
-            return _Organ("background", points, np.array([*_TENDRIL_RADIUS, around, around]))
+            held = np.array([point, between, on_wire, on_wire + _WOUND * along])
+            return _Organ("background", held, np.array([*_TENDRIL_RADIUS, around, around]))
     points, heading = [point], side
     for _ in range(3):
         points.append(points[-1] + draw(rng, _TENDRIL_ROD) * unit_vector(heading))
