@@ -1,24 +1,18 @@
 """Lateral shoots, tendrils, old leaves and drooping canes: from the seed, seen, felt, and gone with their cane."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from msgspec.structs import replace as changed
 
-from benchmarks.control.cut_truth import true_cut, wanted_cuts
-from bridge.config import BridgeConfig
-from bridge.core.interface import Setpoint
 from bridge.sim.build import simulated_robot
 from bridge.sim.camera.config import CameraConfig
 from bridge.sim.camera.renderer import Camera
-from bridge.sim.robot import trace
 from bridge.sim.robot.model import STEP_S
-from bridge.sim.robot.robot import SimulatedRobot
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
-from bridge.sim.vineyard.row import Array, Rod, Row
+from bridge.sim.vineyard.row import Rod, Row
 from bridge.sim.vineyard.truth import judge, judge_guyot, staying_rods
 from bridge.sim.world.canes import Canes
 from bridge.sim.world.config import CALM, PRESETS, only
@@ -27,9 +21,8 @@ from bridge.sim.world.wind import Wind
 from rolling_panda.config import load_section
 from rolling_panda.messages.types import WOOD_CLASSES
 from rolling_panda.resources import resource
-from tests.support.cameras import Blind, looking_left
+from tests.support.cameras import looking_left
 
-CONFIG = load_section(resource("assets/config/sim.toml"), "bridge", BridgeConfig)
 ONE = VineyardConfig(vines=1)
 ORGANS = ("laterals", "tendrils", "leaves")
 ALL = changed(CALM, laterals=1.0, tendrils=1.0, leaves=1.0)
@@ -188,48 +181,6 @@ def test_a_cut_takes_what_grows_beyond_it_and_leaves_what_grows_below() -> None:
     hanging = row.sever(spur.cut.rod, 0.5, hangs)
     for k, rod in own:
         assert hanging.rods[k].end == pytest.approx(rod.end + hangs * (k in beyond))
-
-
-def before_the_tool(rods: tuple[Rod | None, ...], place: Array, along: Array, tool: Array) -> Row:
-    """The wood of vines' spurs, moved so that the place is between the blades, square to them."""
-    across = np.cross(along, [0.0, 1.0, 0.0])
-    across /= np.linalg.norm(across)
-    R = tool[:3, :3] @ np.column_stack([across, along, np.cross(across, along)]).T
-    at = tool[:3, 3]
-
-    def moved(rod: Rod) -> Rod:
-        return replace(rod, start=at + R @ (rod.start - place), end=at + R @ (rod.end - place))
-
-    return Row(tuple(moved(rod) if rod is not None and rod.spur >= 0 else None for rod in rods))
-
-
-@pytest.mark.parametrize(("aside", "right"), [(0.0, True), (0.03, False)])
-def test_to_cut_a_lateral_along_with_its_cane_is_right_and_by_itself_neither_right_nor_harm(
-    aside: float, right: bool, tmp_path: Path
-) -> None:
-    row = grow(ONE, 11)
-    spur = next(truth for truth in judge(row) if truth.cut is not None)
-    cut, node = spur.cut, row.rods[spur.cut.rod - 1]
-    side = np.cross(cut.tangent, [0.0, 1.0, 0.0])
-    side /= np.linalg.norm(side)
-    # From the last node that stays, past the blades.
-    start, end = node.at(0.5)[0], cut.best + aside * side + 0.01 * cut.tangent
-    lateral = Rod("cane", start, end, 0.0015, 0.001, cut.rod - 1, spur.vine, spur.spur, spur.keeper, organ=0)
-    tool = SimulatedRobot(CONFIG, Row(()), Blind()).true_tool()
-    between = cut.best + aside * side
-    standing = before_the_tool((*row.rods, lateral), between, cut.tangent, tool)
-    wanted = wanted_cuts(standing)
-    sim = SimulatedRobot(CONFIG, standing, Blind(), trace.TraceWriter(tmp_path / "trace"))
-    sim.cut("c1", "p1")
-    for _ in range(700):
-        sim.write(Setpoint(np.zeros(9), True, 1, 1, 0.0))
-    sim.close()
-    (bite,) = [event for event in trace.read(tmp_path / "trace").events if event["event"] == "cut"]
-    result = true_cut(wanted, bite["severed"])
-    assert (result.right, result.harm) == (right, "")
-    left = sim.row.rods[len(row.rods)]
-    assert left is not None and np.linalg.norm(left.end - left.start) < np.linalg.norm(end - start) - 0.005
-    assert (sim.row.rods[cut.rod + 1] is None) == right
 
 
 def test_laterals_push_back_as_thin_as_they_are_and_leaves_and_tendrils_not_at_all() -> None:
