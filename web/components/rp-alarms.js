@@ -106,6 +106,11 @@ function newRow(reason) {
   const act = element("span", { class: "act" });
   const since = element("time", { text: clockWords(Date.now() / 1000), attributes: { title: text("alarms.since") } });
   const press = element("button", { class: "alarm-press", onclick: () => void (step && take(step)) });
+  const fold = element("button", {
+    class: "alarm-fold quiet",
+    attributes: { "aria-expanded": "false", "aria-label": text("bar.more") },
+    onclick: () => fold.setAttribute("aria-expanded", String(fold.getAttribute("aria-expanded") !== "true")),
+  });
   const row = element(
     "li",
     { data: { severity, code: reason.code } },
@@ -113,6 +118,7 @@ function newRow(reason) {
     element("span", { class: "alarm-words" }, words, act),
     press,
     since,
+    fold,
   );
   let seenAt = 0;
   let step = /** @type {Step|undefined} */ (undefined);

@@ -56,7 +56,7 @@ const BOTTOM = 20;
 const TOP = 8;
 const RIGHT = 14;
 /** Least distance of two times on the axis (px). */
-const TIME_PX = 64;
+const TIME_PX = 84;
 
 /**
  * @param {number} at
@@ -79,7 +79,6 @@ function drawTimes({ pen, width, height, colour }, newest) {
   pen.strokeStyle = colour("line");
   pen.fillStyle = colour("muted");
   pen.lineWidth = 1;
-  pen.textAlign = "center";
   pen.textBaseline = "bottom";
   for (let back = 0; back <= SPAN_MS / MINUTE_MS; back++) {
     const x = Math.round(xAt(newest - back * MINUTE_MS, newest, width)) + 0.5;
@@ -87,7 +86,10 @@ function drawTimes({ pen, width, height, colour }, newest) {
     pen.moveTo(x, TOP);
     pen.lineTo(x, height - BOTTOM + 3);
     pen.stroke();
-    if (back % every === 0) pen.fillText(back === 0 ? text("charts.now") : text("charts.minutes", { minutes: back }), x, height);
+    if (back % every !== 0) continue;
+    // There is no room for half of it beyond the axis.
+    pen.textAlign = back === 0 ? "right" : "center";
+    pen.fillText(back === 0 ? text("charts.now") : text("charts.minutes", { minutes: back }), back === 0 ? width : x, height);
   }
 }
 

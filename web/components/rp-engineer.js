@@ -281,8 +281,9 @@ function topicTable() {
 /** @param {TopicTraffic} topic */
 function newRow({ name, sender }) {
   const from = sender === "any" ? text("process.all") : labelOf(sender);
-  const cells = ["rate", "nominal", "age", "count", "rejected"].map(() => element("td", { class: "number" }));
-  const row = element("tr", { data: { topic: name } }, element("th", { text: name, attributes: { scope: "row", translate: "no" } }), element("td", { text: from }), ...cells);
+  const cells = ["rate", "nominal", "age", "count", "rejected"].map((each) => element("td", { class: "number", data: { name: text(`topics.${each}`) } }));
+  const sent = element("td", { text: from, data: { name: text("topics.sender") } });
+  const row = element("tr", { data: { topic: name } }, element("th", { text: name, attributes: { scope: "row", translate: "no" } }), sent, ...cells);
   return { row, cells };
 }
 

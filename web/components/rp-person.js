@@ -1,5 +1,6 @@
 // Who is signed in, and behind that name: inviting somebody, settings, help, and signing out.
 
+import { holder } from "../js/control/lease.js";
 import { post } from "../js/link/api.js";
 import { pageState, say } from "../js/state/page-state.js";
 import { reasonText } from "../js/state/reasons.js";
@@ -34,7 +35,9 @@ class RpPerson extends HTMLElement {
       const state = pageState.get();
       setText(name, state?.user ?? "");
       setAttribute(open, "aria-label", text("person.open", { user: state?.user ?? "" }));
-      setText(role, state ? `${state.user} · ${labelOf(state.role)} · ${counted("person.pages", state.viewers)}` : "");
+      const pages = state && counted("person.pages", state.viewers);
+      const control = holder().mine ? ` · ${text("control.yours")}` : "";
+      setText(role, state ? `${state.user} · ${labelOf(state.role)} · ${pages}${control}` : "");
     });
   }
 }

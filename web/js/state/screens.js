@@ -10,6 +10,11 @@ export const SCREENS = Object.freeze(["work", "review", "drive", "report", "engi
 /** The open screen. */
 export const screen = signal(named() ?? "work");
 
+/** Is there a view beside this screen, or a picture on it? @param {ScreenName} name */
+export function hasView(name) {
+  return name !== "report" && name !== "engineer";
+}
+
 /** @returns {ScreenName|undefined} The screen that the address names. */
 function named() {
   return SCREENS.find((each) => `#${each}` === location.hash);
