@@ -1,5 +1,7 @@
 """No window is too small for a screen of the page: the stop, the view, the next step and every control are there."""
 
+from collections.abc import Callable
+
 import pytest
 from playwright.sync_api import Page, expect
 
@@ -16,6 +18,7 @@ SIZES = (
     *((1440, 900), (1280, 720), (1024, 768), (960, 600), (844, 390), (390, 844), (720, 450)),
     *((1024, 690), (768, 1024), (620, 900)),
 )
+SCREENS = ["work", "review", "drive", "report", "engineer"]
 #: How much of a part is to be seen once it has been scrolled to: neither the screen nor what it lies in cuts it off.
 SEEN = """each => {
   each.scrollIntoView({ block: "center" });
@@ -26,17 +29,54 @@ SEEN = """each => {
   const [least, most] = [(of) => Math.min(...edges.map(of)), (of) => Math.max(...edges.map(of))];
   return [least(edge => edge.right) - most(edge => edge.left), least(edge => edge.bottom) - most(edge => edge.top)];
 }"""
-#: Controls that cannot be pressed where they are, once they have been scrolled to, and what lies over them.
-COVERED = """over => [...document.querySelectorAll("button, select, input, summary, a")].flatMap(each => {
-  if (!each.checkVisibility({ visibilityProperty: true }) || each.closest("[hidden]")) return [];
-  if (over && each.closest(over)) return [];
-  each.scrollIntoView({ block: "center" });
-  const box = each.getBoundingClientRect();
-  const found = document.elementFromPoint((box.left + box.right) / 2, (box.top + box.bottom) / 2);
-  const whole = box.left >= 0 && box.right <= innerWidth;
-  if (whole && (each.contains(found) || each.closest("label")?.contains(found))) return [];
-  return [`${each.id || each.className || each.textContent || each.type} under ${found?.id || found?.localName}`];
-})"""
+#: Controls of these screens that cannot be pressed, even once somebody has scrolled to them: less than all of one is in
+#: sight, or a press at its middle or near a corner meets another part.
+NOT_PRESSED = """async screens => {
+  const nameOf = each => each && (each.id || each.className || each.textContent.trim().slice(0, 20) || each.localName);
+  const frames = each => {
+    const found = [];
+    for (let one = each.parentElement; one; one = one.parentElement) {
+      const { overflowX, overflowY } = getComputedStyle(one);
+      if (overflowX !== "visible" || overflowY !== "visible") found.push({ one, overflowX, overflowY });
+    }
+    return found;
+  };
+  const faultOf = (each, around) => {
+    const box = each.getBoundingClientRect();
+    const edges = [new DOMRect(0, 0, innerWidth, innerHeight), ...around.map(({ one }) => one.getBoundingClientRect())];
+    if (edges.some(edge => box.left < edge.left - 2 || box.right > edge.right + 2)) return "is cut at a side";
+    if (edges.some(edge => box.top < edge.top - 2 || box.bottom > edge.bottom + 2)) return "is cut";
+    const [x, y] = [Math.min(8, box.width / 4), Math.min(8, box.height / 4)];
+    const points = [[box.left + x, box.top + y], [box.right - x, box.top + y], [box.left + x, box.bottom - y],
+      [box.right - x, box.bottom - y], [box.x + box.width / 2, box.y + box.height / 2]];
+    const hits = points.map(([x, y]) => document.elementFromPoint(x, y));
+    const other = hits.find(hit => !each.contains(hit) && !each.closest("label")?.contains(hit));
+    return other === undefined ? "" : `under ${nameOf(other)}`;
+  };
+  const scrollTo = (each, around) => {
+    const places = around.map(({ one }) => [one.scrollLeft, one.scrollTop]);
+    each.scrollIntoView({ block: "center", inline: "center" });
+    // What nobody can scroll does not count.
+    around.forEach(({ one, overflowX, overflowY }, index) => {
+      if (overflowX === "hidden") one.scrollLeft = places[index][0];
+      if (overflowY === "hidden") one.scrollTop = places[index][1];
+    });
+  };
+  const faults = [];
+  for (const name of screens) {
+    location.hash = name;
+    while (document.querySelector("main").dataset.screen !== name) await new Promise(requestAnimationFrame);
+    for (const each of document.querySelectorAll("button, select, input, summary, a[href], #drive-pad")) {
+      if (!each.checkVisibility({ visibilityProperty: true })) continue;
+      const around = frames(each);
+      if (!faultOf(each, around)) continue;
+      scrollTo(each, around);
+      const fault = faultOf(each, around);
+      if (fault) faults.push(`${name}: ${nameOf(each)} ${fault}`);
+    }
+  }
+  return faults;
+}"""
 #: Words that are cut off.
 CUT = "all => all.filter(each => each.scrollWidth > each.clientWidth + 1).map(each => each.outerHTML.slice(0, 120))"
 #: What scrolls sideways, other than tables, and the strip of all cuts, which is made for it.
@@ -68,21 +108,21 @@ def view_share(page: Page, width: int, height: int) -> float:
     return box["width"] * box["height"] / (width * height)
 
 
-def fits(page: Page, width: int, height: int, over: str = "") -> None:
-    """Nothing is cut off, covered or beyond an edge; what lies in `over` may have a banner over it."""
+def fits(page: Page, width: int, height: int) -> None:
+    """Nothing is cut off, covered or beyond an edge."""
     stop_is_in_sight(page, width, height)
     page.wait_for_function(SETTLED)
     assert page.locator("rp-bar .next button").evaluate(SEEN)[1] >= 44, "the next step is in sight"
     across, down = page.evaluate("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]")
     assert across <= width and down <= height, "the page itself scrolls"
     assert page.evaluate(SIDEWAYS) == []
-    assert page.evaluate(COVERED, over) == []
+    assert page.evaluate(NOT_PRESSED, [page.evaluate("location.hash.slice(1)")]) == []
     assert page.locator("button:visible, a.button:visible, rp-screens a:visible").evaluate_all(CUT) == []
 
 
 def test_every_screen_fits_every_window(page: Page, server: PlayedServer, subtests: pytest.Subtests) -> None:
     working(page, server)
-    for name in ("work", "review", "drive", "report", "engineer"):
+    for name in SCREENS:
         open_screen(page, name)
         for width, height in SIZES:
             page.set_viewport_size({"width": width, "height": height})
@@ -102,52 +142,86 @@ def test_a_whole_vine_fits_every_window(page: Page, server: PlayedServer, subtes
             assert picture.evaluate(SEEN)[1] >= 0.9 * box_of(picture)["height"]
 
 
+def somebody_else(page: Page, server: PlayedServer) -> None:
+    server.control, server.viewers = held("other", "Bob"), 2
+    expect(page.locator("#take-control")).to_be_visible()
+
+
+def told(page: Page, server: PlayedServer) -> None:
+    """Two short notices, which stay for this test."""
+    page.evaluate("""async () => {
+      window.setTimeout = () => 0;
+      const [{ showToast }, { reason, reasonText }] =
+        await Promise.all(["/js/state/page-state.js", "/js/state/reasons.js"].map(each => import(each)));
+      showToast("warning", reasonText(reason("hold_view_stale", { limit_s: 0.5 })));
+      showToast("error", reasonText(reason("reset_unexplained")));
+    }""")
+    expect(page.locator(".toast")).to_have_count(2)
+
+
+#: What a page tells, one after another; each state begins where the one before was left.
+TOLD: dict[str, Callable[[Page, PlayedServer], None]] = {
+    "idle": lambda page, server: None,
+    "somebody else in control": somebody_else,
+    "running": STATES["running"],
+    "paused": STATES["paused"],
+    "stopped": STATES["stopped"],
+    "a short notice": told,
+    "no link": STATES["link-lost"],
+}
+
+
 @pytest.mark.parametrize("language", ["de", "fr"])
-def test_every_screen_fits_in_languages_of_long_words(
+def test_whatever_is_told_every_control_can_be_pressed(
     page: Page, server: PlayedServer, subtests: pytest.Subtests, language: str
 ) -> None:
+    """In languages of long words."""
     page.evaluate("language => localStorage.setItem('setting.language', language)", language)
     page.reload()
     expect(page.locator("html")).to_have_attribute("lang", language)
-    working(page, server)
-    for name in ("work", "review", "drive", "report", "engineer"):
+    for name in reversed(SCREENS):
         open_screen(page, name)
-        for width, height in ((1440, 900), (1024, 768), (390, 844)):
+    for state, bring in TOLD.items():
+        server.bridge, server.stopped, server.control = PlayedServer().bridge, (), None
+        working(page, server)
+        bring(page, server)
+        page.wait_for_function(SETTLED)
+        for width, height in SIZES[:7]:
             page.set_viewport_size({"width": width, "height": height})
-            with subtests.test(screen=name, size=f"{width}x{height}"):
-                fits(page, width, height)
+            with subtests.test(state=state, size=f"{width}x{height}"):
+                assert page.evaluate(NOT_PRESSED, SCREENS) == []
+                assert page.locator("button:visible, a.button:visible").evaluate_all(CUT) == []
 
 
 def test_the_view_has_most_of_the_window_and_no_banner_takes_any_of_it(
     page: Page, server: PlayedServer, subtests: pytest.Subtests
 ) -> None:
-    def at_every_size(state: str, over: str = "") -> None:
+    def at_every_size(state: str) -> None:
         for width, height in SIZES:
             page.set_viewport_size({"width": width, "height": height})
             with subtests.test(state=state, size=f"{width}x{height}"):
                 least = 0.45 if width >= 1024 and height >= 720 else 0.4 if (width, height) == (390, 844) else 0.3
                 assert view_share(page, width, height) >= least
-                # On a telephone a banner that is higher than the view goes on over the list.
-                fits(page, width, height, f"{over}, .screen" if over and width <= 700 and width < height else over)
+                fits(page, width, height)
 
     working(page, server)
     at_every_size("working")
     page.locator("#show-preview").click()
     expect(page.locator("rp-preview")).to_be_visible()
-    at_every_size("preview", ".stage")
+    at_every_size("preview")
     page.locator("#close-preview").click()
     STATES["stopped"](page, server)
-    at_every_size("stopped", ".stage")
+    at_every_size("stopped")
     server.bridge, server.stopped = PlayedServer().bridge, ()
     show_mode(page, server, controller("PAUSED", reason="nobody has looked at the robot for 2.0 s, and there is " * 3))
-    at_every_size("paused", ".stage")
+    at_every_size("paused")
     server.online = False
     server.sockets[-1].close()
     expect(page.locator("rp-link-banner")).to_contain_text("No link to the server")
-    at_every_size("no link", ".stage")
+    at_every_size("no link")
 
 
-@pytest.mark.parametrize("name", ["work", "review", "drive", "report", "engineer"])
+@pytest.mark.parametrize("name", SCREENS)
 def test_the_words_of_a_banner_have_room_on_every_screen(
     page: Page, server: PlayedServer, name: str, subtests: pytest.Subtests
 ) -> None:
@@ -170,26 +244,6 @@ def test_on_a_telephone_a_pause_hides_little_of_what_is_decided(page: Page, serv
     expect(banner).to_contain_text("Paused")
     assert box_of(banner)["height"] <= 80
     expect(page.locator(".next #to-continue, .next #resume").first).to_be_visible()
-
-
-def test_a_banner_covers_no_decision_beside_the_picture(
-    page: Page, server: PlayedServer, subtests: pytest.Subtests
-) -> None:
-    working(page, server)
-    choose(page, "p3")
-    server.control = held("other", "Bob")
-    show_mode(page, server, controller("PAUSED", reason="nobody has looked at the robot for 2.0 s, and there is " * 3))
-    expect(page.locator("rp-alarms li:visible")).to_have_count(1)
-    for width, height in SIZES:
-        if width < height:
-            continue
-        page.set_viewport_size({"width": width, "height": height})
-        with subtests.test(size=f"{width}x{height}"):
-            covered = """all => all.filter(each => {
-              const { left, top, width, height } = each.getBoundingClientRect();
-              return document.elementFromPoint(left + width / 2, top + height / 2)?.closest(".notices");
-            }).map(each => each.id || each.textContent)"""
-            assert page.locator("#review-accept, #review-leave, .review-head button").evaluate_all(covered) == []
 
 
 @pytest.mark.parametrize("name", ["review", "drive", "report", "engineer"])
@@ -228,13 +282,15 @@ def test_on_a_telephone_a_screen_has_one_scroller(page: Page, server: PlayedServ
 def test_on_a_telephone_the_controls_that_drive_are_in_sight(page: Page, server: PlayedServer, language: str) -> None:
     page.set_viewport_size({"width": 390, "height": 844})
     page.evaluate("language => localStorage.setItem('setting.language', language)", language)
-    for state, needed in {"base": "#drive-pad", "tool": ".arrows button", "joints": ".joint button"}.items():
+    for state, needed in {"base": "#drive-pad", "tool": "#hold, .arrows button", "joints": ".joint button"}.items():
         page.reload()
         STATES[f"teleoperate-{state}"](page, server)
-        screen, control = box_of(page.locator("rp-drive")), box_of(page.locator(needed).first)
-        foot = page.locator(".drive-foot")
+        screen, foot = box_of(page.locator("rp-drive")), page.locator(".drive-foot:has(> #go:not([hidden]))")
         end = box_of(foot)["y"] if foot.is_visible() else screen["y"] + screen["height"]
-        assert screen["y"] <= control["y"] and control["y"] + control["height"] <= end, state
+        # Of the tool every axis.
+        controls = page.locator(needed).all()
+        for control in map(box_of, controls if state == "tool" else controls[:1]):
+            assert screen["y"] <= control["y"] and control["y"] + control["height"] <= end, state
         assert view_share(page, 390, 844) >= 0.4
 
 
@@ -253,19 +309,6 @@ def test_large_letters_and_large_targets_where_somebody_works(page: Page, server
         page.set_viewport_size({"width": width, "height": height})
         pressed = page.locator(":is(header, main, rp-bar) :is(button, a, select, summary):visible")
         assert pressed.evaluate_all(low) == []
-
-
-def test_a_refusal_is_told_over_no_decision_beside_the_picture(
-    page: Page, server: PlayedServer, subtests: pytest.Subtests
-) -> None:
-    STATES["refused"](page, server)
-    for width, height in SIZES:
-        if width < height:
-            continue
-        page.set_viewport_size({"width": width, "height": height})
-        with subtests.test(size=f"{width}x{height}"):
-            toast, facts = box_of(page.locator(".toast")), box_of(page.locator(".review-side"))
-            assert toast["x"] + toast["width"] <= facts["x"]
 
 
 def test_on_a_telephone_the_preview_leaves_the_view_and_a_stop_is_seen_whole(page: Page, server: PlayedServer) -> None:
