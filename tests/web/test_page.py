@@ -8,6 +8,7 @@ from playwright.sync_api import Browser, Page, Route, expect
 from rolling_panda import reasons
 from rolling_panda.messages import page as p
 from rolling_panda.reasons import text_of
+from server.api.responses import outcome
 from tests.support.page_host import STAND_STILL
 from tests.support.page_parts import choose, open_screen
 from tests.support.played_page import box_of, until
@@ -53,6 +54,19 @@ def test_a_greyed_button_does_nothing_and_says_why_to_a_finger(page: Page, serve
     page.locator("#reset-reason").press("Enter")
     expect(page.locator(".toast").last).to_contain_text(text_of(reasons.reset_unexplained()))
     assert server.posted == []
+
+
+def test_every_notice_ends_by_itself(page: Page, server: PlayedServer) -> None:
+    # Twenty times as fast.
+    page.evaluate("""() => {
+      const later = window.setTimeout.bind(window);
+      window.setTimeout = (act, ms) => later(act, ms / 20);
+    }""")
+    for status in (409, 503, 500):
+        server.answers["/api/arm"] = (status, outcome(False, reasons.hold_interrupted()))
+        page.evaluate("import('/js/link/api.js').then(({ ask }) => ask('Arm', 'api/arm'))")
+        expect(page.locator(".toast")).to_be_visible()
+        expect(page.locator(".toast")).to_have_count(0, timeout=2000)
 
 
 def test_it_says_that_it_is_a_simulation(page: Page, server: PlayedServer) -> None:

@@ -38,6 +38,21 @@ def test_where_there_is_no_view_it_is_said_only_if_there_is_something_to_press(
     expect(page.locator("#grant-control")).to_be_visible()
 
 
+def test_that_one_holds_control_is_said_for_a_moment_and_then_by_the_menu(page: Page, server: PlayedServer) -> None:
+    server.control = held("other", "Bob")
+    server.viewers = 2
+    expect(page.locator("rp-lease")).to_contain_text("Bob holds control")
+    server.control = held("me", "Ada")
+    expect(page.locator("rp-lease")).to_contain_text("You hold control")
+    expect(page.locator("rp-lease")).to_be_visible()
+    expect(page.locator("rp-lease")).to_be_hidden(timeout=10_000)
+    page.locator("#person").click()
+    expect(page.locator("#person-menu")).to_contain_text("You hold control")
+    page.keyboard.press("Escape")
+    server.control = held("other", "Bob")
+    expect(page.locator("#take-control")).to_be_visible()
+
+
 def test_control_is_taken_from_somebody_only_by_a_second_press(page: Page, server: PlayedServer) -> None:
     open_screen(page, "drive")
     server.control = held("other", "Bob")

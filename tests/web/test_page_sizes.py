@@ -235,7 +235,9 @@ def test_the_words_of_a_banner_have_room_on_every_screen(
             assert box_of(words)["width"] >= 150
 
 
-def test_on_a_telephone_a_pause_hides_little_of_what_is_decided(page: Page, server: PlayedServer) -> None:
+def test_on_a_telephone_a_pause_hides_little_of_what_is_decided_until_it_is_unfolded(
+    page: Page, server: PlayedServer
+) -> None:
     working(page, server)
     choose(page, "p3")
     page.set_viewport_size({"width": 390, "height": 844})
@@ -244,6 +246,13 @@ def test_on_a_telephone_a_pause_hides_little_of_what_is_decided(page: Page, serv
     expect(banner).to_contain_text("Paused")
     assert box_of(banner)["height"] <= 80
     expect(page.locator(".next #to-continue, .next #resume").first).to_be_visible()
+    cut = "each => each.scrollHeight > each.clientHeight + 1"
+    assert banner.locator("strong").evaluate(cut)
+    banner.locator(".alarm-fold").click()
+    expect(banner.locator(".act")).to_be_visible()
+    assert not banner.locator("strong").evaluate(cut)
+    banner.locator(".alarm-fold").click()
+    expect(banner.locator(".act")).to_be_hidden()
 
 
 @pytest.mark.parametrize("name", ["review", "drive", "report", "engineer"])
@@ -324,6 +333,19 @@ def test_on_a_telephone_the_preview_leaves_the_view_and_a_stop_is_seen_whole(pag
         box = box_of(page.locator(part))
         assert box["y"] + box["height"] <= bar["y"]
         assert page.locator(part).evaluate(SEEN)[1] >= 44
+
+
+@pytest.mark.parametrize("language", ["en", "de", "es", "fr", "it"])
+def test_on_a_tablet_all_that_can_be_done_to_a_cut_is_in_sight(page: Page, server: PlayedServer, language: str) -> None:
+    page.set_viewport_size({"width": 1024, "height": 768})
+    page.evaluate("language => localStorage.setItem('setting.language', language)", language)
+    page.reload()
+    working(page, server)
+    choose(page, "p1")
+    strip = box_of(page.locator("rp-point-strip"))
+    for each in page.locator(".review-decide button, .review-tools button").all():
+        if each.is_visible():
+            assert box_of(each)["y"] + box_of(each)["height"] <= strip["y"]
 
 
 @pytest.mark.parametrize("language", ["en", "de", "es"])

@@ -19,6 +19,8 @@ import { text } from "./texts.js";
 /** @typedef {{ id: number, severity: Severity, text: string }} Toast */
 
 const MAX_LINES = 500;
+/** A toast stays for this time per letter, so that it can be read (ms). */
+const READING_MS = 60;
 /** Age from which the state of a process is stale (s). */
 export const STALE_AFTER_S = { bridge: 1, controller: 1, perception: 2, server: 1 };
 
@@ -94,13 +96,15 @@ export function say(severity, text) {
 }
 
 /**
+ * Show a toast, which ends by itself.
+ *
  * @param {Severity} severity
  * @param {string} text
  */
 export function showToast(severity, text) {
   const toast = { id: nextToast++, severity, text };
   toasts.set([...toasts.get().filter((each) => each.text !== text), toast].slice(-3));
-  setTimeout(() => dismissToast(toast.id), severity === "error" ? 10000 : 6000);
+  setTimeout(() => dismissToast(toast.id), Math.max(severity === "error" ? 10_000 : 6000, READING_MS * text.length));
 }
 
 /** @param {number} id */
