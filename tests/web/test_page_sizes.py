@@ -66,7 +66,7 @@ NOT_PRESSED = """async screens => {
   for (const name of screens) {
     location.hash = name;
     while (document.querySelector("main").dataset.screen !== name) await new Promise(requestAnimationFrame);
-    for (const each of document.querySelectorAll("button, select, input, summary, a[href], #drive-pad")) {
+    for (const each of document.querySelectorAll("button, select, input, summary, a[href]")) {
       if (!each.checkVisibility({ visibilityProperty: true })) continue;
       const around = frames(each);
       if (!faultOf(each, around)) continue;
