@@ -36,6 +36,10 @@ BENCHMARKS = {
     "live": ("benchmarks.control.live", "the running demo: control periods on time, round trip, tool error"),
     "perception": ("benchmarks.perception.survey", "surveys of unseen rows, every pruning point judged"),
     "localise": ("benchmarks.perception.localise", "out along the row and back: where is a place that was seen before"),
+    "frame-time": (
+        "benchmarks.perception.frame_time",
+        "pictures that are later than their times tell: the estimate, and points with and without it",
+    ),
     "joints": ("benchmarks.perception.joints", "zeros of the arm's joints by the board: before and after"),
     "photographs": ("benchmarks.perception.photographs", "classes of photographs, against masks that people drew"),
     "familiarity": (

@@ -51,6 +51,8 @@ class BridgeConfig(Struct, frozen=True, forbid_unknown_fields=True):
         joints_hz: Rate of the joint states (Hz); the topic table has the nominal rate.
         camera_moving_hz: Frame rate while the robot moves or just after the row has changed (Hz).
         camera_resting_hz: Frame rate otherwise (Hz).
+        frame_time_offset: By how much pictures are exposed later than their times tell (s). A frame gets the posture of
+            that much later.
         odometry: Delay and noise of the simulated base's odometry.
     """
 
@@ -72,4 +74,5 @@ class BridgeConfig(Struct, frozen=True, forbid_unknown_fields=True):
     joints_hz: Annotated[float, at_least(50.0, 1000.0)] = JOINTS.rate_hz
     camera_moving_hz: Positive = 2.0
     camera_resting_hz: Positive = 0.5
+    frame_time_offset: Annotated[float, Meta(ge=-0.2, le=0.2)] = 0.0
     odometry: OdometryConfig = OdometryConfig()

@@ -190,7 +190,7 @@ class Perception:
         if self._is_survey(view, labels):
             plant = perceive_plant(view, labels, self._config.skeleton)
             canes = [cane for spur in plant.spurs for cane in spur.canes]
-            self.camera.observe(view, _base(frame), [cane.axis for cane in canes])
+            self.camera.observe(view, frame, [cane.axis for cane in canes])
             self.row_frame.update(view, labels, canes)
             if self.row_frame.lost is not None:
                 return self._process_unfamiliar(self.row_frame.in_map(view), labels, self.row_frame.lost)

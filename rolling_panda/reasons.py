@@ -2657,6 +2657,16 @@ def camera_looks_down(angle: float, sd: float) -> None:
     """The camera looks {angle:.1f}° (± {sd:.1f}°) below where it was calibrated."""
 
 
+@_reason("warning", "points seen in motion are off; add it to frame_time_offset")
+def frames_late(offset: float, interval: float) -> None:
+    """Camera pictures are {offset:.0f} ms (± {interval:.0f} ms) later than their times tell."""
+
+
+@_reason("warning", "points seen in motion are off; take it from frame_time_offset")
+def frames_early(offset: float, interval: float) -> None:
+    """Camera pictures are {offset:.0f} ms (± {interval:.0f} ms) earlier than their times tell."""
+
+
 @_reason("warning", "calibrate it again")
 def calibration_old(days: float) -> None:
     """The camera was calibrated {days:.0f} days ago."""

@@ -132,7 +132,9 @@ class BridgeCore:
         self._draw = draw
         self._faults = RobotFaults(draw)
         self._orders = CutOrders(cuts)
-        self._camera_trigger = CameraTrigger(config.camera_moving_hz, config.camera_resting_hz, TICK_S)
+        self._camera_trigger = CameraTrigger(
+            config.camera_moving_hz, config.camera_resting_hz, TICK_S, config.frame_time_offset
+        )
         self._pace = TimeRatio()
         self._ticks = 0
         self._joint_ticks = round(1 / config.joints_hz / TICK_S)
@@ -447,6 +449,7 @@ class BridgeCore:
             actuated(measured.position),
             self._calibration.sizes,
             self._calibration.joint_offsets,
+            actuated(measured.velocity),
         )
         self._camera_trigger.follow(posture)
         expose = self._camera_trigger.due(self._ticks)

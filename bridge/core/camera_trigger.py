@@ -23,13 +23,22 @@ class Posture(NamedTuple):
     position: m.Actuated
     wheels: tuple[float, float, float] | None = None
     joint_offsets: m.JointOffsets = m.NO_OFFSETS
+    velocity: m.ActuatedVelocity | None = None
 
 
 class CameraTrigger:
     """Triggers frames, one at a time: at the moving rate while awake, else at the resting rate. Counts in ticks."""
 
-    def __init__(self, moving_hz: float, resting_hz: float, tick_s: float) -> None:
-        """Start awake, with the first picture due at once."""
+    def __init__(self, moving_hz: float, resting_hz: float, tick_s: float, offset: float = 0.0) -> None:
+        """Start awake, with the first picture due at once.
+
+        Args:
+            moving_hz: Rate while awake.
+            resting_hz: Rate otherwise.
+            tick_s: Length of a tick (s).
+            offset: By how much pictures are exposed later than their times tell (s).
+        """
+        self._offset = offset
         self._moving = round(1 / moving_hz / tick_s)
         self._resting = round(1 / resting_hz / tick_s)
         self._awake = round(_AWAKE_S / tick_s)
@@ -76,6 +85,9 @@ class CameraTrigger:
         taken_at = picture.taken_at
         if taken_at is not None and self._postures:
             posture = min(self._postures, key=lambda known: abs(known.clock - taken_at))
+        if self._offset != 0.0 and self._postures:
+            true = posture.header.stamp + self._offset
+            posture = min(self._postures, key=lambda known: abs(known.header.stamp - true))
         self._sequence += 1
         return CameraFrame(
             header=posture.header,
@@ -91,4 +103,5 @@ class CameraTrigger:
             number=0 if wanted is None else wanted.number,
             wheels=posture.wheels,
             joint_offsets=posture.joint_offsets,
+            velocity=posture.velocity,
         )

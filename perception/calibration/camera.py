@@ -55,7 +55,7 @@ class CameraCalibration:
     @property
     def state(self) -> CameraState:
         """State for people."""
-        error = self._monitor.error
+        error, time = self._monitor.error, self._monitor.time
         return CameraState(
             header=m.Header(self._stamp, "camera"),
             mount=self._mount,
@@ -65,6 +65,8 @@ class CameraCalibration:
             turned=None if error is None else vector3(error.turn),
             turned_sd=None if error is None else vector3(np.sqrt(np.diag(error.covariance)[:3])),
             observations=0 if error is None else error.pictures,
+            time_offset=None if time is None else time.offset,
+            time_offset_sd=None if time is None else time.sd,
             warning=self._warning,
         )
 
@@ -117,16 +119,20 @@ class CameraCalibration:
         """Whether these offsets of the joints are the ones that `follow` was told last."""
         return self._offsets in (None, offsets)
 
-    def observe(self, view: View, base: Array, axes: Sequence[Array]) -> None:
+    def observe(self, view: View, frame: CameraFrame, axes: Sequence[Array]) -> None:
         """Compare the canes of a picture of the row with earlier ones; what is wrong is told, and corrected on offer.
 
         Args:
             view: The picture.
-            base: Pose of the base in odom (3).
+            frame: The frame that it is from.
             axes: Centre line of each cane from its base outwards, N×3 in odom (m).
         """
         before = self._monitor.error
-        self._monitor.observe(view.R, view.t, base, axes)
+        base, velocity = np.array([frame.base.x, frame.base.y, frame.base.phi]), None
+        if frame.velocity is not None:
+            q = configuration(frame.base, frame.position)
+            velocity = self._model.velocity(q, np.array(frame.velocity), self._model.camera_id)
+        self._monitor.observe(view.R, view.t, base, axes, velocity, view.stamp)
         error = self._monitor.error
         if error is before or error is None or (self._offer is not None and self._offer.source == "board"):
             return
@@ -157,6 +163,8 @@ class CameraCalibration:
     def _warning(self) -> m.Reason | None:
         if self._monitor.error is not None and self._monitor.error.warning is not None:
             return self._monitor.error.warning
+        if self._monitor.time is not None and self._monitor.time.warning is not None:
+            return self._monitor.time.warning
         if self._mount is not None and not self.fits(self._mount.joint_offsets):
             return reasons.camera_of_other_arm()
         age_s = 0.0 if self._mount is None else self._clock() - self._mount.made_at

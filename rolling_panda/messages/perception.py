@@ -388,6 +388,9 @@ class CameraState(Message, frozen=True, kw_only=True):
             forward); None before enough was seen.
         turned_sd: Standard deviation of that about each axis (rad).
         observations: Pictures that it is from.
+        time_offset: By how much pictures are exposed later than the joint states that come with them, by ordinary work
+            (s); None before enough was seen in motion.
+        time_offset_sd: Standard deviation of that (s).
         warning: What is wrong with the calibration; None if nothing is known.
     """
 
@@ -399,6 +402,8 @@ class CameraState(Message, frozen=True, kw_only=True):
     turned: Vector3 | None = None
     turned_sd: Vector3 | None = None
     observations: Count = 0
+    time_offset: Finite | None = None
+    time_offset_sd: NonNegative | None = None
     warning: Reason | None = None
 
 

@@ -336,6 +336,7 @@ class CameraFrame(Message, frozen=True, kw_only=True):
         wheels: Sizes of the wheels by which `base` and the wheels' `position` were computed: left and right radius and
             track (m). None for those drawn.
         joint_offsets: Offsets of the arm's joints that were taken from what its encoders told (rad).
+        velocity: Measured actuated velocities at exposure (rad/s); None in recordings of earlier versions.
     """
 
     header: Header
@@ -351,3 +352,4 @@ class CameraFrame(Message, frozen=True, kw_only=True):
     number: Count = 0
     wheels: tuple[Radius, Radius, Track] | None = None
     joint_offsets: JointOffsets = NO_OFFSETS
+    velocity: ActuatedVelocity | None = None

@@ -110,6 +110,12 @@ class RobotModel:
         pin.framesForwardKinematics(self.model, self.data, q)
         return self.data.oMf[frame_id].copy()
 
+    def velocity(self, q: Array, xi: Array, frame_id: int) -> Array:
+        """Velocity of a frame in its own axes, v (m/s) and ω (rad/s), at q (12) with actuated velocities ξ (9)."""
+        J = pin.computeFrameJacobian(self.model, self.data, q, frame_id, pin.LOCAL)
+        out: Array = J @ self.drive.basis(float(q[2])) @ xi
+        return out
+
 
 def assemble() -> Any:
     """Pinocchio model of base, arm and tool, with nq = nv = 12."""

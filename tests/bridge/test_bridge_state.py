@@ -476,11 +476,11 @@ def test_a_picture_is_told_with_the_posture_in_which_it_was_taken() -> None:
             bench.hear(bench.core.step(bench.now), xi)
     frame, told = next((out.frame, bench.now) for out in reversed(bench.outputs) if out.frame is not None)
     (then,) = {
-        out.joints.position
+        (out.joints.position, out.joints.velocity)
         for out in bench.outputs
         if out.joints is not None and out.joints.header.stamp == frame.header.stamp
     }
-    assert frame.header.stamp < told - 0.2 and frame.position == then
+    assert frame.header.stamp < told - 0.2 and (frame.position, frame.velocity) == then
 
 
 def test_an_order_that_is_refused_for_itself_is_not_told_as_a_cut_that_failed(bench: Bench) -> None:

@@ -1,5 +1,7 @@
 from dataclasses import replace
 
+import pytest
+
 from bridge.core.camera_trigger import CameraTrigger, Posture
 from bridge.core.picture import Picture
 from rolling_panda import messages as m
@@ -82,6 +84,17 @@ def test_a_picture_that_does_not_know_when_it_was_taken_gets_the_posture_of_its_
     shutter.exposed(500, posture(0.5, 0.15))
     frame = shutter.frame(PICTURE)
     assert frame is not None and (frame.header.stamp, frame.base.x) == (0.5, 0.15)
+
+
+def test_pictures_that_are_later_than_their_times_get_the_posture_of_that_much_later() -> None:
+    for offset, taken_at, stamp in ((0.04, 1.5, 1.54), (-0.03, 1.5, 1.47), (0.04, None, 1.04), (0.5, 2.9, 2.99)):
+        shutter = CameraTrigger(2.0, 0.5, 1e-3, offset)
+        for k in range(300):
+            shutter.follow(posture(k * 0.01, k * 0.003))
+        shutter.exposed(1000, posture(1.0, 0.3))
+        frame = shutter.frame(replace(PICTURE, taken_at=taken_at))
+        assert frame is not None
+        assert (frame.header.stamp, frame.base.x) == (pytest.approx(stamp), pytest.approx(0.3 * stamp))
 
 
 def test_a_frame_carries_all_of_its_picture() -> None:

@@ -6,16 +6,16 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from perception.calibration.monitor import WARNS, MountMonitor
+from perception.calibration.monitor import LATE_WARNS, WARNS, MountMonitor
 
 AHEAD = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 BASE = np.zeros(3)
 
 
-def canes(rng, count=12):
+def canes(rng, count=12, first=0.0, last=1.1):
     """Canes of a row 0.75 m to the left, in odom."""
     out = []
-    for x in np.linspace(0.0, 1.1, count):
+    for x in np.linspace(first, last, count):
         lean = np.array([rng.normal(0.0, 0.2), rng.normal(0.0, 0.1), 1.0])
         out.append(np.array([x, 0.75, 0.95]) + np.linspace(0.0, 0.5, 40)[:, None] * lean)
     return out
@@ -93,3 +93,113 @@ def test_another_calibration_begins_anew():
     assert monitor.error is not None
     monitor.forget()
     assert monitor.error is None
+
+
+class Rider:
+    """A robot that looks at a row while it moves, with pictures that are exposed later than their joints."""
+
+    def __init__(self, late, rng, noise=0.0, turn=(0.0, 0.0, 0.0), jitter=0.0):
+        self.monitor, self.row, self.rng = MountMonitor(), canes(rng, 16, -0.4, 1.7), rng
+        self.late, self.noise, self.turn, self.jitter = late, noise, np.array(turn), jitter
+        self.stamp = 0.0
+
+    def look(self, R, t, velocity, base=BASE, aside=(0.0, 0.0, 0.0)):
+        """A picture; `velocity` is of the camera in its own frame, `aside` by how much the wheels are wrong."""
+        late = self.late + self.jitter * self.rng.standard_normal()
+        true = pin.SE3(R, np.array(t) + aside) * pin.exp6(np.array(velocity) * late)
+        seen = []
+        for axis in self.row:
+            local = (axis - true.translation) @ true.rotation @ pin.exp3(self.turn)
+            if abs(local[0, 0]) > 0.5:
+                continue
+            off = self.noise * (self.rng.standard_normal(3) + 0.3 * self.rng.standard_normal(axis.shape))
+            seen.append(local @ R.T + t + off)
+        self.stamp += 0.5
+        self.monitor.observe(R, np.array(t), np.array(base, float), seen, np.array(velocity, float), self.stamp)
+
+    def move_arm(self, count=14, speed=0.2, turning=0.3):
+        """The arm moves while the base stands."""
+        for R, t in poses(self.rng, count):
+            v, w = self.rng.normal(0.0, speed, 3), self.rng.normal(0.0, turning, 3)
+            self.look(R, t, [*v, *w])
+        return self
+
+    def drive(self, stops=4, slip=0.0):
+        """The base drives along the row with the arm at rest, and stops now and then."""
+        x = wrong = 0.0
+        for _ in range(stops):
+            for way, speed in ((0.05, 0.0), (0.0, 0.0), (0.05, 0.25), (0.125, 0.25), (0.125, 0.25)):
+                x, wrong = x + way, wrong + slip * way * self.rng.standard_normal()
+                # The camera looks to the left of the way: forward is along its x.
+                self.look(AHEAD, [x, 0.0, 1.05], [speed, *[0.0] * 5], (x - 0.5, 0.0, 0.0), (wrong, 0.0, 0.0))
+        return self
+
+
+offsets = st.floats(-0.06, 0.06)
+
+
+@settings(max_examples=12, deadline=None, phases=(Phase.explicit, Phase.generate))
+@given(offsets, turns, st.floats(0.0, 0.0015), st.integers(0, 1000))
+def test_pictures_in_motion_tell_time_and_mount_apart(late, turn, noise, seed):
+    rng = np.random.default_rng(seed)
+    monitor = Rider(late, rng, noise, turn, jitter=0.005).move_arm().monitor
+    time, error = monitor.time, monitor.error
+    assert abs(time.offset - late) < 4.0 * time.sd and time.sd < 0.01
+    assert (np.abs(error.turn - turn) < 4.5 * np.sqrt(np.diag(error.covariance)[:3]) + 1e-3).all()
+    if time.warning is not None:
+        assert time.warning.code == ("frames_late" if late > 0.0 else "frames_early")
+        assert abs(late) > LATE_WARNS - 4.0 * time.sd
+    if abs(late) > LATE_WARNS + 6.6 * time.sd:
+        assert time.warning is not None
+
+
+@settings(max_examples=12, deadline=None, phases=(Phase.explicit, Phase.generate))
+@given(offsets, st.floats(0.0, 0.0015), st.floats(0.0, 0.04), st.integers(0, 1000))
+def test_a_survey_that_starts_and_stops_tells_the_offset_though_its_wheels_slip(late, noise, slip, seed):
+    rider = Rider(late, np.random.default_rng(seed), noise, jitter=0.003).drive(slip=slip)
+    time = rider.monitor.time
+    assert abs(time.offset - late) < 4.0 * time.sd and time.sd < 0.02
+    assert rider.monitor.error is None, "the mount is told while the base stands"
+
+
+def test_the_standard_deviation_is_that_of_the_errors():
+    told = [Rider(0.02, np.random.default_rng(seed), 0.001, jitter=0.01).move_arm().monitor.time for seed in range(16)]
+    scaled = [(each.offset - 0.02) / each.sd for each in told]
+    assert 0.5 < np.std(scaled) < 1.4 and abs(np.mean(scaled)) < 0.6
+
+
+def test_a_camera_whose_times_are_right_is_not_complained_about():
+    riders = [Rider(0.0, np.random.default_rng(seed), 0.001, jitter=0.01) for seed in range(6)]
+    assert not any(rider.move_arm().drive().monitor.time.warning for rider in riders)
+
+
+def test_at_rest_at_one_speed_or_with_few_moving_pictures_nothing_is_told_of_time():
+    rng = np.random.default_rng(5)
+    still = Rider(0.04, rng, 0.001).move_arm(speed=0.0, turning=0.0)
+    assert still.monitor.error is not None and still.monitor.time is None
+    steady = Rider(0.04, rng, 0.001)
+    for k in range(20):
+        steady.look(AHEAD, [0.1 * k, 0.0, 1.05], [0.2, *[0.0] * 5], (0.1 * k - 0.5, 0.0, 0.0))
+    assert steady.monitor.time is None
+    few = Rider(0.04, rng, 0.001).move_arm(8, 0.0, 0.0).move_arm(2)
+    assert few.monitor.time is None
+    unknown = Rider(0.04, rng, 0.001)
+    for R, t in poses(rng, 12):
+        unknown.look(R, t, [np.nan] * 6)
+    assert unknown.monitor.time is None and unknown.monitor.error is None
+
+
+def test_a_clock_that_jumps_tells_nothing_wrong():
+    rider = Rider(0.04, np.random.default_rng(6), 0.001).move_arm().drive()
+    assert rider.monitor.time.warning.code == "frames_late"
+    rider.late, rider.stamp = 0.0, 1.0
+    rider.look(AHEAD, [0.5, 0.0, 1.05], [0.0] * 6)
+    assert rider.monitor.time is None, "what was seen by the old clock is no more"
+    rider.move_arm(24)
+    assert rider.monitor.time.warning is None
+    # For some pictures the postures are those of another moment.
+    jumping = Rider(0.0, np.random.default_rng(7), 0.001).move_arm(12)
+    jumping.late = 0.5
+    jumping.move_arm(3)
+    jumping.late = 0.0
+    assert jumping.move_arm(6).monitor.time.warning is None

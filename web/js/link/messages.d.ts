@@ -941,6 +941,10 @@ export interface CameraState {
   turned_sd: Vector3|null;
   /** Pictures that it is from. */
   observations: number;
+  /** By how much pictures are exposed later than the joint states that come with them, by ordinary work (s); None before enough was seen in motion. */
+  time_offset: number|null;
+  /** Standard deviation of that (s). */
+  time_offset_sd: number|null;
   /** What is wrong with the calibration; None if nothing is known. */
   warning: Reason|null;
 }
