@@ -6,10 +6,11 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from perception.calibration.monitor import LATE_WARNS, WARNS, MountMonitor
+from perception.calibration.monitor import LATE_WARNS, WARNS, MountMonitor, TimeOffset
 
 AHEAD = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 BASE = np.zeros(3)
+UPRIGHT = pin.SE3.Identity()
 
 
 def canes(rng, count=12, first=0.0, last=1.1):
@@ -103,10 +104,10 @@ class Rider:
         self.late, self.noise, self.turn, self.jitter = late, noise, np.array(turn), jitter
         self.stamp = 0.0
 
-    def look(self, R, t, velocity, base=BASE, aside=(0.0, 0.0, 0.0)):
-        """A picture; `velocity` is of the camera in its own frame, `aside` by how much the wheels are wrong."""
+    def look(self, R, t, velocity, base=BASE, wrong=UPRIGHT):
+        """A picture; `velocity` is of the camera in its own frame, `wrong` how the base stands otherwise."""
         late = self.late + self.jitter * self.rng.standard_normal()
-        true = pin.SE3(R, np.array(t) + aside) * pin.exp6(np.array(velocity) * late)
+        true = wrong * pin.SE3(R, np.array(t)) * pin.exp6(np.array(velocity) * late)
         seen = []
         for axis in self.row:
             local = (axis - true.translation) @ true.rotation @ pin.exp3(self.turn)
@@ -124,14 +125,22 @@ class Rider:
             self.look(R, t, [*v, *w])
         return self
 
-    def drive(self, stops=4, slip=0.0):
+    def drive(self, stops=4, slip=0.0, tilt=0.0):
         """The base drives along the row with the arm at rest, and stops now and then."""
-        x = wrong = 0.0
+        x = slipped = 0.0
         for _ in range(stops):
             for way, speed in ((0.05, 0.0), (0.0, 0.0), (0.05, 0.25), (0.125, 0.25), (0.125, 0.25)):
-                x, wrong = x + way, wrong + slip * way * self.rng.standard_normal()
+                x, slipped = x + way, slipped + slip * way * self.rng.standard_normal()
+                leans = self.rng.normal(0.0, tilt, 3) * (1.0, 1.0, 0.2)
+                under = pin.SE3(np.eye(3), np.array([x - 0.5, 0.0, 0.0]))
+                wrong = (
+                    pin.SE3(np.eye(3), np.array([slipped, 0.0, 0.0]))
+                    * under
+                    * pin.SE3(pin.exp3(leans), np.zeros(3))
+                    * under.inverse()
+                )
                 # The camera looks to the left of the way: forward is along its x.
-                self.look(AHEAD, [x, 0.0, 1.05], [speed, *[0.0] * 5], (x - 0.5, 0.0, 0.0), (wrong, 0.0, 0.0))
+                self.look(AHEAD, [x, 0.0, 1.05], [speed, *[0.0] * 5], (x - 0.5, 0.0, 0.0), wrong)
         return self
 
 
@@ -162,10 +171,31 @@ def test_a_survey_that_starts_and_stops_tells_the_offset_though_its_wheels_slip(
     assert rider.monitor.error is None, "the mount is told while the base stands"
 
 
-def test_the_standard_deviation_is_that_of_the_errors():
-    told = [Rider(0.02, np.random.default_rng(seed), 0.001, jitter=0.01).move_arm().monitor.time for seed in range(16)]
+@pytest.mark.parametrize(
+    ("how", "ground", "jitter"), [("move_arm", {}, 0.01), ("drive", {"slip": 0.08, "tilt": 0.007}, 0.005)]
+)
+def test_the_standard_deviation_is_that_of_the_errors(how, ground, jitter):
+    riders = [Rider(0.02, np.random.default_rng(seed), 0.001, jitter=jitter) for seed in range(16)]
+    told = [getattr(rider, how)(**ground).monitor.time for rider in riders]
     scaled = [(each.offset - 0.02) / each.sd for each in told]
-    assert 0.5 < np.std(scaled) < 1.4 and abs(np.mean(scaled)) < 0.6
+    assert 0.4 < np.std(scaled) < 1.4 and abs(np.mean(scaled)) < 0.8
+
+
+@pytest.mark.parametrize(
+    ("offset", "sd", "code"),
+    [
+        (0.020, 0.005, "frames_late"),
+        (-0.020, 0.005, "frames_early"),
+        (0.020, 0.009, None),
+        (0.008, 0.001, None),
+        (-0.008, 0.001, None),
+    ],
+)
+def test_an_offset_is_complained_about_that_is_certain_and_matters(offset, sd, code):
+    warning = TimeOffset(offset, sd, 9).warning
+    assert (None if warning is None else warning.code) == code
+    if warning is not None:
+        assert dict(warning.values) == pytest.approx({"offset": 20.0, "interval": 13.0})
 
 
 def test_a_camera_whose_times_are_right_is_not_complained_about():
