@@ -183,16 +183,16 @@ class _Pair:
     """Comparisons of the canes of two pictures.
 
     Attributes:
-        known: The earlier picture.
-        new: The later one.
+        numbers: Of the pictures.
+        moving: Those in which the camera moves.
         A: What the estimated does, and the time of either picture, in its SD (N×3×9).
         B: What the unknowns of a way of the base do, in their SD (N×3×12).
         off: Disagreement (N×3, m).
         weight: Of each.
     """
 
-    known: _Picture
-    new: _Picture
+    numbers: tuple[int, int]
+    moving: frozenset[int]
     A: Array
     B: Array
     off: Array
@@ -241,9 +241,7 @@ class MountMonitor:
         if not np.isfinite(velocity).all():
             return
         if self._last is not None and stamp < self._last.stamp:
-            self._pictures, self._last, self.time = [], None, None
-            self._changes.clear()
-            self._steady.clear()
+            self._forget_time()
         self._number += 1
         picture = _picture(self._number, R, t, velocity, base, stamp, axes)
         if picture is None:
@@ -265,6 +263,13 @@ class MountMonitor:
                 self._standing.popleft()
             self._count += 1
             self._estimate()
+
+    def _forget_time(self) -> None:
+        """Forget what tells the offset of time, as the clock is another one."""
+        self._pictures, self._last, self.time, self._theta = [], None, None, np.append(self._theta[_MOUNT], 0.0)
+        self._standing = deque(pair for pair in self._standing if not pair.moving)
+        self._changes.clear()
+        self._steady.clear()
 
     def _drove(self, before: _Picture, picture: _Picture) -> None:
         """Compare a picture with the one before, between which the base has moved."""
@@ -310,7 +315,10 @@ class MountMonitor:
             As.append(A)
             Bs.append(B)
             offs.append(off.mean(axis=0))
-        return _Pair(known, picture, np.stack(As), np.stack(Bs), np.stack(offs), weight) if offs else None
+        if not offs:
+            return None
+        moving = frozenset(each.number for each in (known, picture) if each.moves)
+        return _Pair((known.number, picture.number), moving, np.stack(As), np.stack(Bs), np.stack(offs), weight)
 
     def _estimate(self) -> None:
         pairs = [*self._standing, *self._changes, *self._steady]
@@ -319,7 +327,7 @@ class MountMonitor:
         starts, of = np.concatenate([[0], np.cumsum(lengths)[:-1]]), np.repeat(np.arange(len(pairs)), lengths)
         given = np.array([pair.weight for pair in pairs])[of]
         # Where each column of a pair is among all that is estimated: of the camera, and the time of each picture.
-        numbers = np.array([[pair.known.number, pair.new.number] for pair in pairs])
+        numbers = np.array([pair.numbers for pair in pairs])
         columns = np.column_stack(
             [np.tile(np.arange(7), (len(pairs), 1)), 7 + np.unique(numbers, return_inverse=True)[1].reshape(-1, 2)]
         )
@@ -361,8 +369,8 @@ class MountMonitor:
         self._theta = estimate[_ESTIMATED]
         if self._count >= _NEEDED_PICTURES - 1 and sum(len(pair.off) for pair in self._standing) >= _NEEDED:
             self.error = MountError(self._theta[:3], self._theta[3:6], covariance[_MOUNT, _MOUNT], self._count + 1)
-        telling = [pairs[k] for k in np.flatnonzero(told[:, 6, 6] > _TELLS**-2)]
-        moving = {each.number for pair in telling for each in (pair.known, pair.new) if each.moves}
+        telling = [pairs[k].moving for k in np.flatnonzero(told[:, 6, 6] > _TELLS**-2)]
+        moving = frozenset[int]().union(*telling)
         self.time = None
         if len(moving) >= _NEEDED_MOVING:
             self.time = TimeOffset(float(self._theta[6]), float(np.sqrt(covariance[6, 6])), len(moving))
