@@ -115,16 +115,23 @@ class SessionReportBuilder:
         if row.state == "CUTTING":
             point = row.point
             # A second try takes the place of the first.
-            for key in [key for key, cut in self._cuts.items() if cut.point_id == point.point_id and not cut.outcome]:
-                del self._cuts[key]
-            cut = CutReport(cut_id=row.cut_id, point_id=point.point_id, vine=point.vine, spur=point.spur, user=row.user)
-            self._cuts[row.cut_id] = cut
+            tries = [key for key, cut in self._cuts.items() if cut.point_id == point.point_id and not cut.outcome]
+            earlier = sum(self._cuts.pop(key).seconds for key in tries)
+            # From one order to the next: whether it was cut is seen on the way to the next one.
+            self._cuts[row.cut_id] = CutReport(
+                cut_id=row.cut_id,
+                point_id=point.point_id,
+                vine=point.vine,
+                spur=point.spur,
+                user=row.user,
+                seconds=earlier + max(when - self._ready_since, 0.0),
+            )
+            self._ready_since = when
         elif known is not None and row.state in _ENDED:
             told = replace(known, outcome=row.state, reason=row.reason, wrong_by=row.wrong_by)
             if not known.outcome:
-                # A person may report the outcome later; the robot spends no time on that.
-                told = replace(told, ended_at=when, seconds=max(when - self._ready_since, 0.0))
-                self._ready_since = when
+                # A person may report the outcome later.
+                told = replace(told, ended_at=when)
             self._cuts[row.cut_id] = told
 
     def _give_up(self, row: TicketRow, when: float) -> None:

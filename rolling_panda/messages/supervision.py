@@ -454,7 +454,8 @@ class CutReport(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
         reason: Reason for the outcome; None without one.
         user: Who accepted the point.
         ended_at: Time of its end (s since 1970); 0 during the cut.
-        seconds: Time from the end of the previous cut, or from a later start of work, to the end of this cut (s).
+        seconds: Time from the order to cut of the previous one, or from a later start of work, to its own (s); of one
+            that was given up before, to its end.
         wrong_by: Who has said that it was wrong; empty without anyone.
     """
 

@@ -45,13 +45,14 @@ def report(*rows):
     return StrictDecoder(SessionReport).decode(encode(account.report()))
 
 
-def test_a_cut_takes_from_the_one_before_or_from_the_start_of_work():
+def test_a_cut_takes_from_the_order_of_the_one_before_or_from_the_start_of_work_to_its_own():
     told = report(
         (0.0, asked(intents.Arm(user="ada"))),
         (10.0, asked(intents.Start(user="ada"))),
         (13.0, ticket("a", "CUTTING", user="ada")),
-        (14.0, ticket("a", "DONE")),
         (17.0, ticket("b", "CUTTING", vine=2, user="ada")),
+        # Seen on the way to the next one.
+        (17.2, ticket("a", "DONE")),
         (17.5, ticket("b", "FAILED_NOT_CUT", vine=2, reason=STANDS)),
         (60.0, asked(intents.Continue(user="ada"))),
         (63.0, ticket("c", "CUTTING", vine=2, user="ada")),
@@ -59,14 +60,14 @@ def test_a_cut_takes_from_the_one_before_or_from_the_start_of_work():
     )
     assert told.began_at == BEGAN
     assert [(cut.point_id, cut.outcome, round(cut.seconds, 3)) for cut in told.cuts] == [
-        ("a", "DONE", 4.0),
-        ("b", "FAILED_NOT_CUT", 3.5),
-        ("c", "DONE", 5.0),
+        ("a", "DONE", 3.0),
+        ("b", "FAILED_NOT_CUT", 4.0),
+        ("c", "DONE", 3.0),
     ]
     assert told.cuts[1].reason == STANDS and told.cuts[1].ended_at == BEGAN + 17.5
     assert [(vine.vine, vine.done, vine.not_cut, round(vine.seconds, 3)) for vine in told.vines] == [
-        (1, 1, 0, 4.0),
-        (2, 1, 1, 8.5),
+        (1, 1, 0, 3.0),
+        (2, 1, 1, 7.0),
     ]
 
 
@@ -78,7 +79,7 @@ def test_a_cut_that_was_tried_twice_is_one_cut():
         (8.0, ticket("a", "FAILED_NOT_CUT", cut_id="second", reason=STANDS)),
     )
     assert [(cut.cut_id, cut.outcome, round(cut.seconds, 3)) for cut in told.cuts] == [
-        ("second", "FAILED_NOT_CUT", 8.0)
+        ("second", "FAILED_NOT_CUT", 6.0)
     ]
     assert told.cut_count == 1
 
@@ -173,7 +174,7 @@ def test_a_point_that_is_given_up_at_its_second_try_leaves_the_first_cut_as_it_w
         (16.0, missed),
     )
     assert [(cut.cut_id, cut.reason, cut.seconds) for cut in told.cuts] == [
-        ("c-a", STANDS, 2.0),
+        ("c-a", STANDS, 1.0),
         ("", LATE, 4.0),
     ]
 
@@ -186,7 +187,7 @@ def test_who_says_later_how_a_cut_ended_takes_the_robot_no_time():
         (500.0, ticket("a", "DONE", user="ada", reason=reasons.inspected("bob", "seen by eye"))),
     )
     (cut,) = told.cuts
-    assert (cut.outcome, cut.user, cut.seconds) == ("DONE", "ada", 5.0)
+    assert (cut.outcome, cut.user, cut.seconds) == ("DONE", "ada", 3.0)
     assert told.vines[0].unknown == 0 and told.vines[0].done == 1
 
 
@@ -239,7 +240,7 @@ def test_who_began_a_cut_is_told_with_its_end_and_a_cut_without_a_known_end_coun
         (0.4, ticket("a", "UNKNOWN", reason=STANDS)),
     )
     (cut,) = told.cuts
-    assert (cut.user, cut.outcome, round(cut.seconds, 3), cut.reason) == ("ada", "UNKNOWN", 0.4, STANDS)
+    assert (cut.user, cut.outcome, round(cut.seconds, 3), cut.reason) == ("ada", "UNKNOWN", 0.2, STANDS)
     assert [(vine.done, vine.not_cut, vine.unknown) for vine in told.vines] == [(0, 0, 1)]
 
 

@@ -177,8 +177,11 @@ def test_the_time_left_learns_from_the_cuts_that_are_made(page: Page, server: Pl
     expect(left).to_have_text("0 of 4 done · 14 s left")
     tells(107.0, done=1)
     expect(left).to_have_text("1 of 4 done · 21 s left")
+    # Of the cut under way what is left of it.
+    tells(110.0, done=1)
+    expect(left).to_have_text("1 of 4 done · 18 s left")
     # A pause is no part of a cut.
-    tells(108.0, done=1, mode="PAUSED")
+    tells(111.0, done=1, mode="PAUSED")
     tells(200.0, done=1)
     tells(207.0, done=2)
     expect(left).to_have_text("2 of 4 done · 14 s left")
@@ -200,3 +203,15 @@ def test_what_waits_for_a_person_is_the_same_number_everywhere(page: Page, serve
     # What the camera may still settle by itself waits for nobody yet.
     server.controller = controller("AUTO", phase="SURVEY")
     expect(page.locator("#needs-you")).to_have_text("3 need you")
+
+
+def test_two_cuts_of_a_spur_are_told_apart_by_their_kind(page: Page, server: PlayedServer) -> None:
+    renewal = point(2, "ACCEPTED")
+    renewal = msgspec.structs.replace(renewal, point=msgspec.structs.replace(renewal.point, kind="renewal cut"))
+    show(server, planned(point(1, "ACCEPTED"), 1), planned(renewal, 2), planned(point(3, "ACCEPTED", spur=2), 3))
+    open_screen(page, "work")
+    names = ["Spur 1 · Spur cut", "Spur 1 · Renewal cut", "Spur 2"]
+    expect(page.locator("rp-work .cut-place")).to_have_text(names)
+    open_screen(page, "review")
+    page.locator("rp-order summary").click()
+    expect(page.locator(".order-name")).to_have_text([f"Vine 1, {name[0].lower()}{name[1:]}" for name in names])

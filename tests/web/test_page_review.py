@@ -469,6 +469,18 @@ def test_a_point_is_moved_by_millimetres_and_an_accepted_one_is_not(page: Page, 
     expect(page.locator("rp-review .handle")).to_have_attribute("visibility", "hidden")
 
 
+def test_a_renewal_cut_is_not_moved_and_says_why(page: Page, server: DecidingServer) -> None:
+    row = server.points[0]
+    renewal = msgspec.structs.replace(row.point, kind="renewal cut")
+    server.points = (msgspec.structs.replace(row, point=renewal), *server.points[1:])
+    server.tell(server.page_points())
+    looking_at(page, "p1")
+    page.locator(".adjust summary").click()
+    told = text_of(reasons.renewal_cut_fixed())
+    expect(page.get_by_role("button", name="+1")).to_have_attribute("title", told)
+    expect(page.locator("rp-review .handle")).to_have_attribute("visibility", "hidden")
+
+
 def test_where_the_robot_would_stand_is_told(page: Page, server: DecidingServer) -> None:
     row = server.points[1]
     base = m.PlanarPose(x=row.point.position[0] - 0.3, y=row.point.position[1] - 0.9, phi=0.0)

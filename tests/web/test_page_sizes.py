@@ -253,6 +253,9 @@ def test_on_a_telephone_a_pause_hides_little_of_what_is_decided_until_it_is_unfo
     assert not banner.locator("strong").evaluate(cut)
     banner.locator(".alarm-fold").click()
     expect(banner.locator(".act")).to_be_hidden()
+    open_screen(page, "review")
+    decide = box_of(page.locator("#review-accept"))
+    assert decide["y"] + decide["height"] <= box_of(banner)["y"]
 
 
 @pytest.mark.parametrize("name", ["review", "drive", "report", "engineer"])

@@ -243,7 +243,7 @@ class RpReview extends HTMLElement {
     const { row } = item;
     const open = all.filter(isOpen).length;
     const at = all.findIndex((each) => each.key === item.key);
-    setText(/** @type {Element} */ (this.count), text("review.count", { at: Math.max(0, at) + 1, count: all.length }));
+    if (at >= 0) setText(/** @type {Element} */ (this.count), text("review.count", { at: at + 1, count: all.length }));
     setText(/** @type {Element} */ (this.name), placeName(item));
     const stale = staleWords("controller", "perception");
     setText(/** @type {Element} */ (this.stale), stale);

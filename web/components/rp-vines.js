@@ -2,7 +2,7 @@
 
 import { timeLeft, vines } from "../js/control/progress.js";
 import { durationWords } from "../js/state/format.js";
-import { points } from "../js/state/page-state.js";
+import { pageState, points } from "../js/state/page-state.js";
 import { drawOn } from "../js/state/signals.js";
 import { text } from "../js/state/texts.js";
 import { element, keepRows, setAttribute, setText } from "../js/views/dom.js";
@@ -15,7 +15,7 @@ class RpVines extends HTMLElement {
     const words = element("p", { class: "number", attributes: { role: "status" } });
     this.append(list, words);
     const bars = keepRows(list, vineBar);
-    drawOn([points], () => {
+    drawOn([points, pageState], () => {
       const found = vines();
       bars(found.map((vine) => [String(vine.vine), vine]));
       setText(words, wordsOf(found));

@@ -4,7 +4,7 @@ import { countOf } from "../js/control/allowed.js";
 import { isUncertain } from "../js/control/decisions.js";
 import { waitingPlaces } from "../js/control/next-step.js";
 import { cutTime } from "../js/control/order.js";
-import { cuts, cutToShow, vines } from "../js/control/progress.js";
+import { cuts, cutToShow, kindOfSeveral, vines } from "../js/control/progress.js";
 import { select, selectAndReveal } from "../js/control/selection.js";
 import { cutOn, fetchPicture } from "../js/link/pictures.js";
 import { link, now, pageState, points, revealCount, selected, staleWords } from "../js/state/page-state.js";
@@ -163,12 +163,13 @@ function cutRow(name) {
   return {
     item,
     /** @param {PagePoint} row */
-    show({ point, entry }) {
+    show(row) {
+      const { point, entry } = row;
       const status = statusOf(entry.state);
       item.dataset.state = entry.state;
       button.dataset.status = status;
       setStatus(shape, status);
-      setText(place, text("work.spur", { spur: point.spur }));
+      setText(place, [text("work.spur", { spur: point.spur }), kindOfSeveral(row)].filter(Boolean).join(" · "));
       setText(state, labelOf(entry.state));
       setAttribute(button, "aria-current", selected.get() === name ? "true" : "");
     },

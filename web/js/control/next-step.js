@@ -60,10 +60,10 @@ function withPreview() {
   return told.phase === "ready" && previewOpen.get() ? "approve" : "preview";
 }
 
-/** How many spurs without a cut wait for a decision. While the robot surveys, another look may settle some. */
+/** How many spurs without a cut wait for a decision. While the robot works by itself, its next looks may settle some. */
 export function waitingPlaces() {
-  const isSurveying = pageState.get()?.controller?.phase === "SURVEY";
-  const waits = (/** @type {Need} */ needs) => needs === "operator" || (needs === "another look" && !isSurveying);
+  const isLooking = pageState.get()?.controller?.mode === "AUTO";
+  const waits = (/** @type {Need} */ needs) => needs === "operator" || (needs === "another look" && !isLooking);
   const sites = (points.get()?.undecided_sites ?? []).filter(({ vine, needs }) => vine > 0 && waits(needs));
   return new Set(sites.map(({ vine, spur }) => `${vine} ${spur}`)).size;
 }

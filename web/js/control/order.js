@@ -7,6 +7,7 @@ import { pointNames } from "../state/point-names.js";
 import { counted, text } from "../state/texts.js";
 import { countOf, whyNot, whyNotPoint } from "./allowed.js";
 import { nameOf, undoable } from "./decisions.js";
+import { timeLeft } from "./progress.js";
 
 /** @typedef {import("../link/messages.js").PagePoint} PagePoint */
 /** @typedef {import("../link/messages.js").PointPlan} PointPlan */
@@ -27,8 +28,8 @@ export function orderWords() {
   const beyond = countOf("UNREACHABLE");
   const more = beyond > 0 ? ` · ${counted("work.beyond", beyond)}` : "";
   if (rows.length === 0) return text(beyond > 0 ? "order.none_left" : "order.none_accepted") + more;
-  const plan = points.get()?.plan;
-  const long = plan?.state === "valid" ? `, ${durationWords(plan.duration_s)}` : "";
+  const seconds = timeLeft();
+  const long = seconds ? `, ${durationWords(seconds)}` : "";
   const whose = orderedBy() ? text("order.by", { user: orderedBy() }) : text("order.by_plan");
   return `${counted("order.points", rows.length)}, ${whose}${long}${more}`;
 }

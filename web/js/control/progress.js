@@ -1,6 +1,7 @@
 // How far the work on the row is: vine by vine, and the time that is left.
 
 import { pageState, points } from "../state/page-state.js";
+import { text } from "../state/texts.js";
 
 /** @typedef {import("../link/messages.js").PagePoint} PagePoint */
 /**
@@ -47,6 +48,12 @@ export function vines() {
   return [...found.values()].sort((a, b) => a.vine - b.vine);
 }
 
+/** How a cut differs from another one of its spur: its kind; empty for the only one. @param {PagePoint} row */
+export function kindOfSeveral({ point }) {
+  const others = cuts().filter((each) => each.point.vine === point.vine && each.point.spur === point.spur);
+  return others.length > 1 ? text(`details.kind.${point.kind}`) : "";
+}
+
 // --- the time that is left ---
 
 /** The pace is that of so many cuts. */
@@ -86,12 +93,18 @@ function pace() {
   return sum(0) > 0 ? sum(1) / sum(0) : 1;
 }
 
-/** Time for what is still to be cut (s), at the pace of the newest cuts; null where it is not known, and 0 where nothing is. */
+/**
+ * Time for what is still to be cut (s), at the pace of the newest cuts; null where it is not known, and 0 where nothing is.
+ * Of the cut under way, what is left of it.
+ */
 export function timeLeft() {
   const ahead = cuts().filter((row) => AHEAD.has(row.entry.state));
-  const times = ahead.flatMap(({ plan }) => (plan?.rollout ? [plan.rollout.ends_s - plan.rollout.begins_s] : []));
-  const known = times.reduce((sum, each) => sum + each, 0);
+  const times = ahead.flatMap(({ point }) => planned.get(point.point_id) ?? []);
+  const known = pace() * times.reduce((sum, each) => sum + each, 0);
   if (ahead.length === 0) return 0;
+  if (times.length === 0) return null;
   // A cut that is not rolled out yet counts as the mean of the others.
-  return times.length > 0 ? (pace() * known * ahead.length) / times.length : null;
+  const mean = known / times.length;
+  const since = Number.isNaN(begun) ? 0 : (pageState.get()?.controller?.header.stamp ?? begun) - begun;
+  return known + mean * (ahead.length - times.length) - Math.min(since, mean);
 }

@@ -833,7 +833,7 @@ export interface CutReport {
   user: string;
   /** Time of its end (s since 1970); 0 during the cut. */
   ended_at: number;
-  /** Time from the end of the previous cut, or from a later start of work, to the end of this cut (s). */
+  /** Time from the order to cut of the previous one, or from a later start of work, to its own (s); of one that was given up before, to its end. */
   seconds: number;
   /** Who has said that it was wrong; empty without anyone. */
   wrong_by: string;

@@ -42,8 +42,8 @@ const LARGEST_RATIO = 1.5;
 const LARGEST_RATIO_IN_SOFTWARE = 1;
 /** Shortest frame period in software (ms). The page's buttons share the thread. */
 const PACE_IN_SOFTWARE = 80;
-/** Frame period in software behind a screen that hides the view (ms). The client needs frames to read its messages. */
-const PACE_HIDDEN = 1000;
+/** Frame period in software behind a screen that hides the view (ms). The client reads its messages, and draws nothing. */
+const PACE_HIDDEN = 300;
 /** After a frame the processor is left to the robot for as long as the frame took, this at most (ms). */
 const LONGEST_REST = 250;
 
@@ -121,6 +121,8 @@ function paceFrames() {
   const draw = (now) => {
     began = performance.now();
     took = 0;
+    const idle = hidden() && document.documentElement.dataset.view === "drawn";
+    for (const each of behind) each.idle = idle;
     for (const number of [...waiting.keys()]) {
       const callback = waiting.get(number);
       waiting.delete(number);

@@ -9,10 +9,15 @@ const ASK_MS = 4;
 /** After this time a frame is shown although it does not report to be finished (ms). */
 const LONGEST_MS = 1000;
 
+/** Calls that draw. */
+const DRAWING = /** @type {const} */ (["drawArrays", "drawElements", "drawArraysInstanced", "drawElementsInstanced"]);
+
 export class OffscreenFramebuffer {
   /** Is a frame rendered but not shown? */
   busy = false;
   drawn = false;
+  /** Is nothing to be drawn, so that the last frame stays? */
+  idle = false;
   width = 0;
   height = 0;
 
@@ -54,9 +59,17 @@ export class OffscreenFramebuffer {
     };
     const clear = gl.clear.bind(gl);
     gl.clear = (mask) => {
+      if (this.idle) return;
       if (this.forDrawing === null) this.drawn = true;
       clear(mask);
     };
+    const { prototype } = WebGL2RenderingContext;
+    for (const name of DRAWING) {
+      // Not bound before: what counts triangles comes and goes.
+      gl[name] = (/** @type {any[]} */ ...values) => {
+        if (!this.idle) /** @type {any} */ (prototype[name]).apply(gl, values);
+      };
+    }
   }
 
   /** As large as the canvas. */
