@@ -58,7 +58,7 @@ export function kindOfSeveral({ point }) {
 
 /** The pace is that of so many cuts. */
 const RECENT = 6;
-/** Planned times of cuts that are not made yet, by point (s). @type {Map<string, number>} */
+/** Planned times of cuts that are not made yet, by point (s); NaN where it is not known. @type {Map<string, number>} */
 const planned = new Map();
 /** Planned and true times of the newest cuts (s). @type {(readonly [number, number])[]} */
 let made = [];
@@ -73,14 +73,15 @@ function learnPace() {
   else if (!(begun <= stamp)) begun = stamp;
   for (const { point, entry, plan } of points.get()?.points ?? []) {
     const name = point.point_id;
-    if (AHEAD.has(entry.state)) {
-      if (plan?.rollout) planned.set(name, plan.rollout.ends_s - plan.rollout.begins_s);
+    if (entry.state === "ACCEPTED") {
+      planned.set(name, plan?.rollout ? plan.rollout.ends_s - plan.rollout.begins_s : (planned.get(name) ?? NaN));
       continue;
     }
     const time = planned.get(name);
     planned.delete(name);
-    if (time === undefined || entry.state !== "DONE" || Number.isNaN(begun)) continue;
-    made = [...made, /** @type {const} */ ([time, stamp - begun])].slice(-RECENT);
+    // The order to cut ends it. Whether it was cut is seen on the way to the next one.
+    if (time === undefined || !(entry.state === "CUTTING" || entry.state === "DONE") || Number.isNaN(begun)) continue;
+    if (!Number.isNaN(time)) made = [...made, /** @type {const} */ ([time, stamp - begun])].slice(-RECENT);
     begun = stamp;
   }
 }
@@ -98,8 +99,8 @@ function pace() {
  * Of the cut under way, what is left of it.
  */
 export function timeLeft() {
-  const ahead = cuts().filter((row) => AHEAD.has(row.entry.state));
-  const times = ahead.flatMap(({ point }) => planned.get(point.point_id) ?? []);
+  const ahead = cuts().filter(({ entry }) => entry.state === "ACCEPTED");
+  const times = ahead.map(({ point }) => planned.get(point.point_id) ?? NaN).filter((time) => !Number.isNaN(time));
   const known = pace() * times.reduce((sum, each) => sum + each, 0);
   if (ahead.length === 0) return 0;
   if (times.length === 0) return null;
