@@ -185,7 +185,7 @@ class WorkConfig(Struct, frozen=True, forbid_unknown_fields=True):
             no depth.
         servo_max_age_s: Age limit of such a picture when its result comes (s).
         servo_jump: A cane that is seen farther than this from where it is expected is another one (m).
-        servo_reach: Largest correction (m). The check of what is between the closing blades has this margin.
+        servo_reach: Largest correction (m). Wood is kept so far from the closing blades before the motion begins.
         search_steps: Iterations of the posture search in 10 ms, distributed over the control periods.
     """
 

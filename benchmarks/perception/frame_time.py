@@ -16,6 +16,7 @@ from msgspec.structs import replace
 
 from benchmarks.common.documents import bench_parser, write
 from benchmarks.common.intervals import quantile
+from benchmarks.perception.judge import nearest_rod
 from benchmarks.perception.row_drive import RowRobot
 from bridge.sim.vineyard.row import Array, Row
 from bridge.sim.world.config import PRESETS, WorldConfig
@@ -98,14 +99,8 @@ def _new(segmenter: str) -> Perception:
 
 def _off_wood(row: Row, perception: Perception) -> list[float]:
     """Distance of each point from the axis of the nearest spur or cane (m), as far as it is on one."""
-    rods = [rod for _, rod in row.standing() if rod.spur >= 0]
-    start, end = np.array([rod.start for rod in rods]), np.array([rod.end for rod in rods])
-    along, out = end - start, []
-    for point in perception.points().points:
-        away = np.array(point.position) - start
-        at = np.clip(np.sum(away * along, axis=1) / np.sum(along**2, axis=1), 0.0, 1.0)
-        out.append(float(np.linalg.norm(away - at[:, None] * along, axis=1).min()))
-    return [off for off in out if off < _ON_WOOD]
+    off = [nearest_rod(row, np.array(point.position))[0] for point in perception.points().points]
+    return [each for each in off if each < _ON_WOOD]
 
 
 def _told(state: CameraState) -> Told:

@@ -128,11 +128,11 @@ class SessionReportBuilder:
             )
             self._ready_since = when
         elif known is not None and row.state in _ENDED:
-            told = replace(known, outcome=row.state, reason=row.reason, wrong_by=row.wrong_by)
-            if not known.outcome:
-                # A person may report the outcome later.
-                told = replace(told, ended_at=when)
-            self._cuts[row.cut_id] = told
+            # A person may report another outcome later.
+            ended = known.ended_at if known.outcome else when
+            self._cuts[row.cut_id] = replace(
+                known, outcome=row.state, reason=row.reason, wrong_by=row.wrong_by, ended_at=ended
+            )
 
     def _give_up(self, row: TicketRow, when: float) -> None:
         point = row.point

@@ -7,10 +7,10 @@ thus disagree by A (δ, τ, Δ), with
 
     A = G₂ − G₁,  G = [R [x]ₓ,  −R,  R [x]ₓ ω − R v].
 
-Only what is square to the cane is compared. The row's true place does not come in. While the base stands neither do
-the wheels. From one picture to the next one the base may also have moved: these pairs tell Δ alone, as slip and the
-tilt of the base on its way are unknowns of each pair, and so is the camera's place. How large they are is estimated
-too. Each moving picture has an error of time of its own.
+Only the component across the cane is compared. The row's true position cancels out, and so do the wheels while the base
+stands. Between two successive pictures the base may have moved. Such a pair tells Δ alone: slip and tilt of the base,
+and the camera's mount, are unknowns of that pair. The sizes of slip and tilt are estimated. Each picture in motion has
+a timing error of its own.
 """
 
 from collections import deque

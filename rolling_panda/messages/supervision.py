@@ -454,8 +454,8 @@ class CutReport(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
         reason: Reason for the outcome; None without one.
         user: Who accepted the point.
         ended_at: Time of its end (s since 1970); 0 during the cut.
-        seconds: Time from the order to cut of the previous one, or from a later start of work, to its own (s); of one
-            that was given up before, to its end.
+        seconds: Time from the previous order to cut, or from a later start of work, to the order for this cut (s). For
+            a point that was given up before its order: to the time when it was given up.
         wrong_by: Who has said that it was wrong; empty without anyone.
     """
 

@@ -1,7 +1,7 @@
 // The order of work, changed by dragging or keys. Only rows in view exist, so that thousands are possible.
 
+import { placeOfCut } from "../js/control/decisions.js";
 import { cutTime, moveTo, orderWords, resetOrder, whyNoMove, whyNoResetOrder, workOrder } from "../js/control/order.js";
-import { kindOfSeveral } from "../js/control/progress.js";
 import { select, selectAndReveal } from "../js/control/selection.js";
 import { link, now, pageState, points, revealCount, selected } from "../js/state/page-state.js";
 import { pointNames } from "../js/state/point-names.js";
@@ -136,8 +136,7 @@ class RpOrder extends HTMLElement {
     const [, number, name, way] = row.children;
     const why = reasonText(point.entry.reason);
     if (number) setText(number, `${at + 1}`);
-    const place = text("work.place", { vine: point.point.vine, spur: point.point.spur });
-    if (name) setText(name, [place, kindOfSeveral(point)].filter(Boolean).join(" · "));
+    if (name) setText(name, placeOfCut(text("work.place", { vine: point.point.vine, spur: point.point.spur }), point));
     if (way) setText(way, point.plan ? cutTime(point.plan) : "");
     setAttribute(row, "data-point-id", point.point.point_id);
     setAttribute(row, "title", why || reasonText(point.point.reason));

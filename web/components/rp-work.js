@@ -1,10 +1,10 @@
 // The screen for the work: the cut under way or the chosen one, what waits for a person, and the cuts vine by vine.
 
 import { countOf } from "../js/control/allowed.js";
-import { isUncertain } from "../js/control/decisions.js";
+import { isUncertain, placeOfCut } from "../js/control/decisions.js";
 import { waitingPlaces } from "../js/control/next-step.js";
 import { cutTime } from "../js/control/order.js";
-import { cuts, cutToShow, kindOfSeveral, vines } from "../js/control/progress.js";
+import { cuts, cutToShow, vines } from "../js/control/progress.js";
 import { select, selectAndReveal } from "../js/control/selection.js";
 import { cutOn, fetchPicture } from "../js/link/pictures.js";
 import { link, now, pageState, points, revealCount, selected, staleWords } from "../js/state/page-state.js";
@@ -169,7 +169,7 @@ function cutRow(name) {
       item.dataset.state = entry.state;
       button.dataset.status = status;
       setStatus(shape, status);
-      setText(place, [text("work.spur", { spur: point.spur }), kindOfSeveral(row)].filter(Boolean).join(" · "));
+      setText(place, placeOfCut(text("work.spur", { spur: point.spur }), row));
       setText(state, labelOf(entry.state));
       setAttribute(button, "aria-current", selected.get() === name ? "true" : "");
     },

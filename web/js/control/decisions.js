@@ -87,6 +87,18 @@ export function nameOf({ point }) {
 }
 
 /**
+ * A cut's place, and its kind where its spur has several.
+ *
+ * @param {string} place
+ * @param {PagePoint} row
+ */
+export function placeOfCut(place, { point }) {
+  const isOfSpur = (/** @type {PagePoint} */ { point: { point_id, vine, spur }, entry }) =>
+    vine === point.vine && spur === point.spur && point_id !== point.point_id && entry.state !== "REJECTED";
+  return points.get()?.points.some(isOfSpur) ? `${place} · ${text(`details.kind.${point.kind}`)}` : place;
+}
+
+/**
  * A proposal below the confidence for accepting it with others at once.
  *
  * @param {PagePoint} row

@@ -1,7 +1,6 @@
 // How far the work on the row is: vine by vine, and the time that is left.
 
 import { pageState, points } from "../state/page-state.js";
-import { text } from "../state/texts.js";
 
 /** @typedef {import("../link/messages.js").PagePoint} PagePoint */
 /**
@@ -46,12 +45,6 @@ export function vines() {
     found.set(point.vine, vine);
   }
   return [...found.values()].sort((a, b) => a.vine - b.vine);
-}
-
-/** How a cut differs from another one of its spur: its kind; empty for the only one. @param {PagePoint} row */
-export function kindOfSeveral({ point }) {
-  const others = cuts().filter((each) => each.point.vine === point.vine && each.point.spur === point.spur);
-  return others.length > 1 ? text(`details.kind.${point.kind}`) : "";
 }
 
 // --- the time that is left ---

@@ -833,7 +833,7 @@ export interface CutReport {
   user: string;
   /** Time of its end (s since 1970); 0 during the cut. */
   ended_at: number;
-  /** Time from the order to cut of the previous one, or from a later start of work, to its own (s); of one that was given up before, to its end. */
+  /** Time from the previous order to cut, or from a later start of work, to the order for this cut (s). For a point that was given up before its order: to the time when it was given up. */
   seconds: number;
   /** Who has said that it was wrong; empty without anyone. */
   wrong_by: string;
