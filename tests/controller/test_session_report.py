@@ -187,7 +187,7 @@ def test_who_says_later_how_a_cut_ended_takes_the_robot_no_time():
         (500.0, ticket("a", "DONE", user="ada", reason=reasons.inspected("bob", "seen by eye"))),
     )
     (cut,) = told.cuts
-    assert (cut.outcome, cut.user, cut.seconds) == ("DONE", "ada", 3.0)
+    assert (cut.outcome, cut.user, cut.seconds, cut.ended_at - BEGAN) == ("DONE", "ada", 3.0, 5.0)
     assert told.vines[0].unknown == 0 and told.vines[0].done == 1
 
 
