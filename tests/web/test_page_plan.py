@@ -55,7 +55,7 @@ def test_what_the_plan_says_of_a_cut_is_told_or_why_it_refuses_it(page: Page) ->
 
 
 def test_what_the_plan_refuses_neither_looks_accepted_nor_is_counted_so(page: Page, server: PlayedServer) -> None:
-    expect(page.locator("rp-order summary")).to_contain_text("1 point, by the plan · 1 cannot be reached")
+    expect(page.locator("rp-order summary")).to_contain_text("1 point, by the plan, 3 s · 1 cannot be reached")
     signs = page.locator(".strip-mark[data-point-id] .body").evaluate_all(
         "all => all.map(each => [getComputedStyle(each).fill, each.getAttribute('d')])"
     )
