@@ -53,6 +53,7 @@ class BridgeConfig(Struct, frozen=True, forbid_unknown_fields=True):
         camera_resting_hz: Frame rate otherwise (Hz).
         frame_time_offset: By how much pictures are exposed later than their times tell (s). A frame gets the posture of
             that much later.
+        inertial: Whether the camera's gyroscope and accelerometer correct the odometry: heading, height, roll, pitch.
         odometry: Delay and noise of the simulated base's odometry.
     """
 
@@ -75,4 +76,5 @@ class BridgeConfig(Struct, frozen=True, forbid_unknown_fields=True):
     camera_moving_hz: Positive = 2.0
     camera_resting_hz: Positive = 0.5
     frame_time_offset: Annotated[float, Meta(ge=-0.2, le=0.2)] = 0.0
+    inertial: bool = False
     odometry: OdometryConfig = OdometryConfig()

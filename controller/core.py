@@ -303,8 +303,10 @@ class Controller:
         sequence, bridge, points = self._movement.sequence, self._supervisor.bridge, inbox.newest(m.PruningPoints)
         if bridge is not None:
             close_up, sight = inbox.newest(CloseUpResult), inbox.newest(CutSight)
-            looked = None if close_up is None else close_up.message, None if sight is None else sight.message
-            for ended in sequence.watch(bridge, *looked, now):
+            level = self._movement.body.frame.level
+            looked = None if close_up is None else level(close_up.message)
+            on_the_way = None if sight is None else level(sight.message)
+            for ended in sequence.watch(bridge, looked, on_the_way, now):
                 self._event_log.log(ended)
         if points is not None and points is not self._points_seen:
             self._points_seen = points

@@ -4,7 +4,6 @@ The schemas are `foxglove.FrameTransform`, `foxglove.PoseInFrame` and `foxglove.
 """
 
 import base64
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -12,6 +11,8 @@ from typing import Any
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import Localisation
 from rolling_panda.messages.robot import CameraFrame
+from rolling_panda.model.base_attitude import T_odom_base
+from rolling_panda.model.robot import pose_message
 
 _VECTOR = {"type": "object", "properties": {name: {"type": "number"} for name in "xyz"}}
 _QUATERNION = {"type": "object", "properties": {name: {"type": "number"} for name in "xyzw"}}
@@ -39,22 +40,18 @@ def _time(stamp_ns: int) -> dict[str, int]:
 
 
 def _base_transform(message: m.Odometry, stamp_ns: int) -> dict[str, Any]:
-    half = message.pose.phi / 2
-    return {
-        "timestamp": _time(stamp_ns),
-        "parent_frame_id": "odom",
-        "child_frame_id": "base_link",
-        "translation": {"x": message.pose.x, "y": message.pose.y, "z": 0.0},
-        "rotation": {"x": 0.0, "y": 0.0, "z": math.sin(half), "w": math.cos(half)},
-    }
+    return _transform("odom", "base_link", pose_message(T_odom_base(message.pose, message.attitude)), stamp_ns)
 
 
 def _map_transform(message: Localisation, stamp_ns: int) -> dict[str, Any]:
-    pose = message.T_map_odom
+    return _transform("map", "odom", message.T_map_odom, stamp_ns)
+
+
+def _transform(parent: str, child: str, pose: m.Pose, stamp_ns: int) -> dict[str, Any]:
     return {
         "timestamp": _time(stamp_ns),
-        "parent_frame_id": "map",
-        "child_frame_id": "odom",
+        "parent_frame_id": parent,
+        "child_frame_id": child,
         "translation": dict(zip("xyz", pose.position, strict=True)),
         "rotation": dict(zip("xyzw", pose.quat_xyzw, strict=True)),
     }

@@ -14,7 +14,7 @@ from PIL import Image
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.messages.types import Vector3
 from rolling_panda.model.map_frame import MapFrame
-from rolling_panda.model.robot import RobotModel, configuration
+from rolling_panda.model.robot import RobotModel
 
 Moment = Literal["before", "after"]
 #: States of a point from the order to cut on.
@@ -106,7 +106,7 @@ def box_of(close_up: CutCloseUp, model: RobotModel) -> Box | None:
     The cut is in the middle, so that a part of the picture may lie outside the frame.
     """
     frame, k = close_up.frame, model.lens(close_up.frame.intrinsics)
-    camera = close_up.where.pose_in_map(model.pose(configuration(frame.base, frame.position), model.camera_id))
+    camera = close_up.where.camera(frame, model)
     x, y, z = (np.array(close_up.position) - camera.translation) @ camera.rotation
     if z < _NEAREST:
         return None

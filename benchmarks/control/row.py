@@ -3,6 +3,7 @@
 Several methods work on the same accepted points: a seed's row looks the same to each before the first cut.
 """
 
+import dataclasses
 import json
 import math
 import re
@@ -26,6 +27,7 @@ from benchmarks.control.row_stages import StageClock
 from benchmarks.control.row_supervisor import Supervisor
 from benchmarks.control.row_walk import walk
 from benchmarks.peers.reactive import in_rows
+from benchmarks.perception.blocked import Blocker, blocked_by
 from bridge.sim.robot import trace
 from bridge.sim.robot.robot import SimulatedRobot
 from bridge.sim.vineyard.row import Row
@@ -39,6 +41,8 @@ from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.config import load_section
+from rolling_panda.model.map_frame import MapFrame
+from rolling_panda.model.robot import RobotModel
 from rolling_panda.reasons import text_of
 from rolling_panda.resources import resource
 from tests.support.worlds.closed_loop import ClosedLoop
@@ -50,6 +54,8 @@ _SURVEY_S = 6.0
 _LOOK_S, _LIMIT_S = 3.0, 120.0
 #: After the work, in which the last close-up is taken (s).
 _AFTER_S = 3.0
+#: A point is of a right cut within this (m).
+_OF_POINT = 0.06
 #: Periods between two looks at what touches a cane.
 _LOOK_EVERY = 4
 #: Controllers of others that can work off a row.
@@ -70,6 +76,7 @@ def cut_row(
     localise: bool = False,
     supervised: bool = False,
     servo: bool | None = None,
+    frame_time_offset: float = 0.0,
 ) -> RowRun:
     """Survey from the start posture, accept up to `points` of what was detected, work through them.
 
@@ -86,8 +93,9 @@ def cut_row(
         looks: False cuts without the closer looks before and after.
         segmenter: In place of the configured one.
         checked: The camera is checked first, and a correction that is offered is used.
-        localise: Perception corrects the odometry by the wood that it has seen.
+        localise: The camera's inertial sensors and the wood that it has seen correct the odometry.
         supervised: A played person lets the work go on after a stop, at most a few times.
+        frame_time_offset: By how much the bridge takes pictures to be later than their times tell (s).
         servo: Whether the motion is corrected on the last way to a cut; None as configured.
         world: Disturbances. Where `odom` drifts, `distance`, `tool_error` and `path_rms` are no truth.
     """
@@ -104,14 +112,19 @@ def cut_row(
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "trace"
-        settings: dict[str, dict[str, object]] = {"perception": {"localise": localise}}
+        settings: dict[str, dict[str, object]] = {
+            "bridge": {"inertial": localise, "frame_time_offset": frame_time_offset},
+            "perception": {"localise": localise},
+        }
         if servo is not None:
             settings["controller.work"] = {"servo": servo}
         config = sim_config(Path(folder) / "row.toml", pictures, world, settings)
         with ClosedLoop(seed, path, config, method, watch, plans, looks, segmenter) as loop:
-            touches, wanted = CaneTouches(staying_rods(row_of(loop))), wanted_cuts(row_of(loop))
+            row = row_of(loop)
+            touches, wanted = CaneTouches(staying_rods(row)), wanted_cuts(row)
             warned = _check_camera(loop) if checked else ""
             accepted = [] if along else _accept(loop, points)
+            blocked = _blocked(loop, accepted, row, wanted)
             begin, other_s, person = loop.now, 0.0, Supervisor(path)
             if along:
                 loop.run(_SURVEY_S)
@@ -133,7 +146,7 @@ def cut_row(
     return RowRun(
         method=method,
         seed=seed,
-        cuts=cuts,
+        cuts=tuple(dataclasses.replace(cut, blocked=blocked.get(cut.point_id, "")) for cut in cuts),
         work_s=work_s,
         other_s=other_s,
         path_rms=math.sqrt(float(np.mean(np.square(errors)))) if errors else 0.0,
@@ -200,6 +213,33 @@ def judged_cuts(
     return tuple(cuts)
 
 
+def _blocked(
+    loop: ClosedLoop, accepted: Sequence[m.QueueEntry], row: Row, wanted: Collection[WantedCut]
+) -> dict[str, Blocker]:
+    """Accepted points whose right cut nothing can make for want of room, by name, with what is in its way.
+
+    A point belongs to the right cut of its kind that is nearest to it as the robot stands now, within `_OF_POINT`.
+    """
+    shown, localisation = loop.inbox.newest(m.PruningPoints), loop.inbox.newest(m.Localisation)
+    if shown is None:
+        return {}
+    model, robot = RobotModel(), loop.bridge.robot
+    assert isinstance(robot, SimulatedRobot)
+    frame = MapFrame() if localisation is None else MapFrame().after(localisation.message)
+    T_map_tool = frame.pose_in_map(model.pose(loop.configuration(), model.tool_id))
+    T_world_map = robot.true_tool() @ T_map_tool.inverse().homogeneous
+    kinds = {point.point_id: point.kind for point in shown.message.points}
+    found: dict[str, Blocker] = {}
+    for entry in accepted:
+        place = T_world_map @ (*(entry.accepted_position or ()), 1.0)
+        kind = kinds.get(entry.point_id)
+        near = [(math.dist(each.cut.best, place[:3]), each.cut) for each in wanted if each.cut and each.kind == kind]
+        away, cut = min(near, key=lambda each: each[0], default=(math.inf, None))
+        if cut is not None and away < _OF_POINT:
+            found[entry.point_id] = blocked_by(row, cut)
+    return found
+
+
 def stopped(reason: m.Reason) -> bool:
     """Whether a line of the log tells of a protective stop."""
     return reason.code == "robot_halted" and dict(reason.values)["after"] == "PROTECTIVE_STOP"
@@ -224,7 +264,8 @@ def sim_config(
 ) -> Path:
     """Write the simulation's configuration with another rate of pictures, disturbances, and settings by section."""
     text = resource("assets/config/sim.toml").read_text(encoding="utf-8")
-    changes = {"bridge": {"camera_moving_hz": pictures}, "world": asdict_of(world), **settings}
+    changes = {"world": asdict_of(world), **settings}
+    changes["bridge"] = {"camera_moving_hz": pictures, **settings.get("bridge", {})}
     for section, values in changes.items():
         head, title, rest = text.partition(f"[{section}]\n")
         body, following, tail = rest.partition("\n[")

@@ -7,6 +7,7 @@ import numpy as np
 
 from benchmarks.common.intervals import share
 from benchmarks.control.row_stages import LIMITS, STAGES
+from benchmarks.perception.blocked import Blocker
 
 #: A cut is at the right place when the cane was severed within this of the accepted point (m).
 RIGHT_PLACE = 0.010
@@ -32,6 +33,7 @@ class Cut:
         past_best: Along the wood, from where the rule puts the blades to where they cut (m).
         aside: Across the wood, from the middle of the blades to the nearest wood as they closed (m); None when they
             did not, or none was near.
+        blocked: What leaves no room for the blades wherever it may be made; empty where there is room.
     """
 
     method: str
@@ -48,6 +50,7 @@ class Cut:
     nodes_left: int | None = None
     past_best: float | None = None
     aside: float | None = None
+    blocked: Blocker = ""
 
     @property
     def bitten(self) -> bool:

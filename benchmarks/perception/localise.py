@@ -21,6 +21,7 @@ from bridge.sim.world.config import PRESETS
 from perception.config import PerceptionConfig
 from perception.pipeline import Perception
 from perception.segmentation.segmenter import SEGMENTERS, choose_segmenter
+from rolling_panda.model.base_attitude import T_odom_base
 
 #: Places that are predicted, beside the base (m): what the arm would cut.
 _PLACES = np.array([[0.3, 0.75, 0.95], [0.5, 0.75, 0.90], [0.7, 0.75, 1.00]])
@@ -53,22 +54,22 @@ class Prediction:
 
 
 def drive(
-    seed: int, metres: float, preset: str, speed: float, pictures: float, segmenter: str
+    seed: int, metres: float, preset: str, speed: float, pictures: float, segmenter: str, inertial: bool
 ) -> tuple[list[Fix], list[float]]:
     """Drive out and back; returns a fix for each frame, and the processor time of each (s)."""
     perception = Perception(PerceptionConfig(localise=True), choose_segmenter(segmenter))
     fixes, times = [], []
-    for each in row_drive(seed, metres, PRESETS[preset], speed, pictures):
+    for each in row_drive(seed, metres, PRESETS[preset], speed, pictures, inertial):
         begin = time.process_time()
         perception.process(each.frame)
         times.append(time.process_time() - begin)
         estimate, base = perception.row_frame.estimate, each.frame.base
-        odometry = pin.SE3(pin.exp3(np.array([0.0, 0.0, base.phi])), np.array([base.x, base.y, 0.0]))
+        odometry = T_odom_base(base, each.frame.attitude)
         fixes.append(
             Fix(
                 each.T_world_base,
                 odometry,
-                estimate.T_map_base,
+                estimate.T_map_odom * odometry,
                 perception.row_frame.T_map_odom * odometry,
                 estimate.covariance,
                 estimate.state,
@@ -121,13 +122,16 @@ def main(argv: Sequence[str]) -> int:
     parser.add_argument("--metres", type=float, default=10.0, help="how far out (default: %(default)s)")
     parser.add_argument("--speed", type=_positive, default=0.15, help="of the base, m/s (default: %(default)s)")
     parser.add_argument("--pictures", type=_positive, default=1.0, help="pictures a second (default: %(default)s)")
+    parser.add_argument("--inertial", action="store_true", help="with the camera's inertial sensors")
     parser.add_argument("--segmenter", default="network", choices=SEGMENTERS, help="(default: %(default)s)")
     words = parser.parse_args(argv)
     found: list[Prediction] = []
     times: list[float] = []
     lost = frames = 0
     for seed in range(words.seed, words.seed + words.count):
-        fixes, took = drive(seed, words.metres, words.preset, words.speed, words.pictures, words.segmenter)
+        fixes, took = drive(
+            seed, words.metres, words.preset, words.speed, words.pictures, words.segmenter, words.inertial
+        )
         found += (new := predictions(seed, fixes))
         times += took
         lost, frames = lost + sum(fix.state == "lost" for fix in fixes), frames + len(fixes)
@@ -138,6 +142,7 @@ def main(argv: Sequence[str]) -> int:
             "speed": words.speed,
             "pictures_hz": words.pictures,
             "segmenter": words.segmenter,
+            "inertial": words.inertial,
             "frames": frames,
             "frames_lost": lost,
             "frame_s_median": float(np.median(times)),

@@ -13,6 +13,7 @@ import pinocchio as pin
 from msgspec.structs import replace
 
 from bridge.config import BridgeConfig
+from bridge.core.attitude import BaseOrientation
 from bridge.core.camera_trigger import CameraTrigger, Posture
 from bridge.core.interface import Setpoint
 from bridge.core.odometer import Odometer
@@ -38,6 +39,8 @@ _TO_LINE, _TO_HEADING, _MOST = 0.4, 0.8, 0.3
 _MOVES = 0.05
 #: Acceleration (m/s²), and how long the robot rests at either end (s).
 _ACCELERATION, _RESTS_S = 0.2, 2.0
+#: Time at rest before the first drive (s).
+_STANDS_S = 1.0
 #: The end of a way is so near (m). Gain by which the arm follows its motion (1/s).
 _NEAR, _FOLLOWS = 0.01, 5.0
 
@@ -60,7 +63,9 @@ class TrueFrame:
 class RowRobot:
     """A simulated robot beside a row, whose camera takes pictures as it moves."""
 
-    def __init__(self, seed: int, metres: float, world: WorldConfig, pictures_hz: float) -> None:
+    def __init__(
+        self, seed: int, metres: float, world: WorldConfig, pictures_hz: float, inertial: bool = False
+    ) -> None:
         """At rest at the origin, in the survey posture.
 
         Args:
@@ -68,16 +73,18 @@ class RowRobot:
             metres: Length of the way along the row that has vines beside it.
             world: Disturbances.
             pictures_hz: Pictures a second.
+            inertial: Whether the camera's inertial sensors correct the odometry.
         """
         path = resource("assets/config/sim.toml")
-        config = load_section(path, "bridge", BridgeConfig)
+        config = replace(load_section(path, "bridge", BridgeConfig), inertial=inertial)
         spacing = load_section(path, "vineyard", VineyardConfig).vine_spacing
         grown = grow(VineyardConfig(vines=math.ceil((metres + 2.0) / spacing) + 1, vine_spacing=spacing), seed)
         self.row = overgrown(grown, world, seed)
         renderer = InlineRenderer(load_section(path, "camera", CameraConfig), seed, world)
         self._robot, self.model = SimulatedRobot(config, self.row, renderer, None, world, seed), RobotModel()
-        self._odometer = Odometer(self.model.drive, config.odometry, STEP_S, seed)
-        self._odometer.follow(self._robot.read().position[:2])
+        orientation = BaseOrientation(RobotModel()) if inertial else None
+        self._odometer = Odometer(self.model.drive, config.odometry, STEP_S, seed, orientation)
+        self._odometer.follow(self._robot.read(), 0.0)
         self._trigger = CameraTrigger(pictures_hz, pictures_hz, STEP_S)
         q = configuration(m.PlanarPose(0.0, 0.0, 0.0), actuated(np.concatenate([[0.0, 0.0], config.start_arm])))
         self._T_base_camera = self.model.pose(q, self.model.camera_id)
@@ -123,6 +130,12 @@ class RowRobot:
             if (frame := self._step(np.array([0.0, 0.0, *speed]))) is not None:
                 yield frame
 
+    def stand(self, seconds: float) -> Iterator[TrueFrame]:
+        """Stand still."""
+        for _ in range(round(seconds / STEP_S)):
+            if (frame := self._step(np.zeros(9))) is not None:
+                yield frame
+
     def later(self, frame: CameraFrame, offset: float) -> CameraFrame:
         """A frame with the posture of a time (s) after its own, as by `frame_time_offset`."""
         stamp = frame.header.stamp + offset
@@ -133,6 +146,7 @@ class RowRobot:
             base=posture.base,
             position=posture.position,
             velocity=posture.velocity,
+            attitude=posture.attitude,
         )
 
     def close(self) -> None:
@@ -143,13 +157,14 @@ class RowRobot:
         robot = self._robot
         robot.write(Setpoint(xi, False, 0, 0, robot.time))
         measured = robot.read()
-        self._odometer.follow(measured.position[:2])
+        self._odometer.follow(measured, robot.time)
         posture = Posture(
             robot.time,
             m.Header(robot.time, "camera"),
             self._odometer.pose,
             actuated(measured.position),
             velocity=actuated(measured.velocity),
+            attitude=self._odometer.attitude,
         )
         self._postures.append(posture)
         self._trigger.follow(posture)
@@ -167,7 +182,12 @@ class RowRobot:
 
 
 def row_drive(
-    seed: int, metres: float, world: WorldConfig, speed: float = 0.15, pictures_hz: float = 2.0
+    seed: int,
+    metres: float,
+    world: WorldConfig,
+    speed: float = 0.15,
+    pictures_hz: float = 2.0,
+    inertial: bool = False,
 ) -> Iterator[TrueFrame]:
     """Drive out along the row and back.
 
@@ -177,8 +197,11 @@ def row_drive(
         world: Disturbances.
         speed: Of the base (m/s).
         pictures_hz: Pictures a second.
+        inertial: Whether the camera's inertial sensors correct the odometry. They begin at rest.
     """
-    robot = RowRobot(seed, metres, world, pictures_hz)
+    robot = RowRobot(seed, metres, world, pictures_hz, inertial)
+    if inertial:
+        yield from robot.stand(_STANDS_S)
     for to in (metres, 0.0):
         yield from robot.drive(to, speed, _ACCELERATION, _RESTS_S)
     robot.close()

@@ -145,7 +145,7 @@ class BridgeCore:
         self._desired: Array = np.zeros_like(limits.velocity)
         self._was_tripped = True
         self._measured = self._calibration.measured(robot.read())
-        self._odometer.follow(self._measured.position[:2])
+        self._odometer.follow(self._measured, 0.0)
         self._cut_id = ""
         self._outcome: m.Outcome = ""
         self._relaxed_limits = relaxed_limits
@@ -350,7 +350,7 @@ class BridgeCore:
         joints = odometry = state = frame = None
         ticks = self._ticks
         if ticks % self._joint_ticks == 0:
-            self._odometer.follow(self._measured.position[:2])
+            self._odometer.follow(self._measured, now)
             joints = self._joint_state(now)
             self._validator.sent(joints.sequence, now)
             self._round_trip.out(joints.sequence, self._clock)
@@ -450,6 +450,7 @@ class BridgeCore:
             self._calibration.sizes,
             self._calibration.joint_offsets,
             actuated(measured.velocity),
+            self._odometer.attitude,
         )
         self._camera_trigger.follow(posture)
         expose = self._camera_trigger.due(self._ticks)

@@ -24,6 +24,7 @@ class Posture(NamedTuple):
     wheels: tuple[float, float, float] | None = None
     joint_offsets: m.JointOffsets = m.NO_OFFSETS
     velocity: m.ActuatedVelocity | None = None
+    attitude: m.BaseAttitude | None = None
 
 
 class CameraTrigger:
@@ -104,4 +105,5 @@ class CameraTrigger:
             wheels=posture.wheels,
             joint_offsets=posture.joint_offsets,
             velocity=posture.velocity,
+            attitude=posture.attitude,
         )

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
+from bridge.core.attitude import Inertial
 from bridge.core.picture import Picture
 from rolling_panda import reasons
 from rolling_panda.messages.types import Outcome, Reason
@@ -20,6 +21,7 @@ class Measurement:
     `detail` explains `outcome`; it is `NO_CUT` before the first cut. `fault` is the reason why the robot cannot move,
     None without one. A person has to release a `severe` fault.
     `external_torque` is the arm's own estimate of the torques by what touches it (7, N·m); None without one.
+    `inertial` is the newest sample of the camera's inertial sensors; None without them.
     `emergency` tells whether the emergency stop button is pressed. `battery` is the charge (0…1), and `arm_success` the
     fraction of the arm's last 100 commands that arrived in time; None if unknown.
     """
@@ -36,6 +38,7 @@ class Measurement:
     battery: float | None = None
     arm_success: float | None = None
     external_torque: Array | None = None
+    inertial: Inertial | None = None
 
 
 @dataclass(frozen=True)

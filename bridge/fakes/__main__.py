@@ -20,7 +20,7 @@ from bridge.fakes.control_box import ControlBox
 from bridge.fakes.cutter import FakeCutter
 from bridge.fakes.mp500 import FakeMp500
 from bridge.real.config import RealConfig
-from bridge.real.picture_link import KEY, pack
+from bridge.real.picture_link import INERTIAL_KEY, KEY, pack, pack_inertial
 from rolling_panda import topics
 from rolling_panda.config import RobotConfig, TransportConfig, load_section
 from rolling_panda.errors import InputError, RollingPandaError
@@ -91,9 +91,14 @@ def _bodies(arguments: argparse.Namespace, picture_hz: float, stack: ExitStack) 
 
     wire = ForeignWire(_wire(arguments), DEVICES)
     stack.callback(wire.close)
-    send = wire.publisher(KEY)
+    send, send_inertial = wire.publisher(KEY), wire.publisher(INERTIAL_KEY)
     robot = simulated_robot(arguments.config, arguments.seed, arguments.trace, "device")
-    plant = VineyardPlant(robot, picture_hz, lambda picture, at: send(pack(picture, at)))
+    plant = VineyardPlant(
+        robot,
+        picture_hz,
+        lambda picture, at: send(pack(picture, at)),
+        lambda sample: send_inertial(pack_inertial(sample)),
+    )
     stack.callback(plant.close)
     return _Bodies(plant, plant, plant)
 

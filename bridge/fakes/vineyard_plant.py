@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from bridge.core.attitude import Inertial
 from bridge.core.interface import Measurement, Setpoint
 from bridge.core.picture import Picture
 from bridge.fakes.bodies import TICK_S
@@ -14,26 +15,31 @@ from bridge.sim.robot.robot import SimulatedRobot
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.reasons import text_of
 
-_PICTURE_TICKS = 10
+_PICTURE_TICKS, _INERTIAL_TICKS = 10, 5
 # For a slow machine: the blades take a third of a second of simulated time.
 _CLOSE_TIMEOUT_S = 10.0
 
 #: Called with a picture and the Unix time of its exposure (s).
 PictureCallback = Callable[[Picture, float], None]
+#: Called with each sample of the inertial sensors.
+InertialCallback = Callable[[Inertial], None]
 
 
 class VineyardPlant:
     """Arm, wheels and blades of one simulated robot. The arm's thread advances time; other threads read and command."""
 
-    def __init__(self, robot: SimulatedRobot, picture_hz: float, on_picture: PictureCallback) -> None:
+    def __init__(
+        self, robot: SimulatedRobot, picture_hz: float, on_picture: PictureCallback, on_inertial: InertialCallback
+    ) -> None:
         """Start at rest.
 
         Args:
             robot: Closed with the plant.
             picture_hz: Rate of exposures in simulated time.
             on_picture: Called with each picture, in the arm's thread.
+            on_inertial: The same with each inertial sample, where the robot has such sensors.
         """
-        self._robot, self._on_picture = robot, on_picture
+        self._robot, self._on_picture, self._on_inertial = robot, on_picture, on_inertial
         self._period = round(1 / picture_hz / TICK_S)
         self._ticks, self._exposed, self._exposed_at = 0, -self._period, 0.0
         self._waiting = False
@@ -89,6 +95,8 @@ class VineyardPlant:
         self._ticks += 1
         if self._ticks % _PICTURE_TICKS == 0:
             self._capture()
+        if self._ticks % _INERTIAL_TICKS == 0 and self._measured.inertial is not None:
+            self._on_inertial(self._measured.inertial)
 
     def drive(self, goal: Array, dt: float) -> None:
         """Set the target speeds of the wheels (2, rad/s)."""

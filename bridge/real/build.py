@@ -9,6 +9,7 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from bridge.config import BridgeConfig
+from bridge.core.attitude import BaseOrientation
 from bridge.core.bridge import TICK_S, BridgeCore
 from bridge.core.calibration import AS_DRAWN, Calibration, Keep, forget
 from bridge.core.cut_orders import CutMemory
@@ -100,7 +101,7 @@ def open_devices(
             f"the real robot's drivers are not installed ({names}); run: pip install 'rolling-panda[real]'"
         )
     real = load_section(config_path, "real", RealConfig)
-    acceleration = load_section(config_path, "bridge", BridgeConfig).wheel_acceleration
+    config = load_section(config_path, "bridge", BridgeConfig)
     if not real.arm.address:
         raise InputError(f'{config_path} does not say where the arm\'s control box is: [real.arm] address = "…"')
     if fakes and not real.arm.address.startswith(_LOOPBACK):
@@ -108,10 +109,12 @@ def open_devices(
             f"{real.arm.address} may be a real arm: with --fakes [real.arm] address has to begin with {_LOOPBACK}"
         )
     with ExitStack() as opened:
-        camera = _camera(wire, real.camera, fakes) if real.camera.enabled else None
+        camera = _camera(wire, real.camera, config.inertial, fakes) if real.camera.enabled else None
         if camera is not None:
             opened.callback(camera.close)
-        base = Mp500(ForeignWire(_reached(wire, real.base.connect)), model.drive, acceleration, real.base, moving)
+        base = Mp500(
+            ForeignWire(_reached(wire, real.base.connect)), model.drive, config.wheel_acceleration, real.base, moving
+        )
         opened.callback(base.close)
         blades = _blades(wire, real.cutter, moving)
         opened.callback(blades.close)
@@ -164,7 +167,8 @@ def real_bridge(
         devices.close()
         raise
     robot = RealRobot(devices.base, devices.arm, devices.blades, devices.camera, moving)
-    odometer = Odometer(model.drive, config.odometry, TICK_S)
+    orientation = BaseOrientation(RobotModel(limits)) if config.inertial else None
+    odometer = Odometer(model.drive, config.odometry, TICK_S, 0, orientation)
     kind: BridgeKind = "fakes" if fakes else "real"
     calibration = Calibration(model.drive.sizes, float(model.limits.velocity[0]), calibrated, keep)
     return BridgeCore(
@@ -192,13 +196,13 @@ def _reached(wire: TransportConfig, connect: str) -> TransportConfig:
     return replace(wire, connect=(connect,), certificates="", plain_wire=False) if connect else wire
 
 
-def _camera(wire: TransportConfig, config: CameraConfig, fakes: bool) -> RealSense:
+def _camera(wire: TransportConfig, config: CameraConfig, inertial: bool, fakes: bool) -> RealSense:
     if not fakes:
-        return open_realsense(config)
+        return open_realsense(config, inertial)
     # Imported here: without fakes none of their code is loaded.
     from bridge.real.software_realsense import open_fake_realsense
 
-    return open_fake_realsense(ForeignWire(wire), config.rate_hz)
+    return open_fake_realsense(ForeignWire(wire), config.rate_hz, inertial)
 
 
 def _blades(wire: TransportConfig, config: CutterConfig, moving: bool) -> Cutter | NoCutter:

@@ -1,12 +1,14 @@
-"""Transfer of the simulated camera's pictures to the camera's driver."""
+"""Transfer of the simulated camera's pictures and inertial samples to the camera's driver."""
 
 import msgspec
+import numpy as np
 
+from bridge.core.attitude import Inertial
 from bridge.core.picture import Picture
 from rolling_panda.messages.robot import Intrinsics
 
-#: Key of the pictures.
-KEY = "fake-camera/exposure"
+#: Keys of the pictures, and of the inertial samples.
+KEY, INERTIAL_KEY = "fake-camera/exposure", "fake-camera/inertial"
 
 
 class Exposure(msgspec.Struct, frozen=True):
@@ -28,3 +30,14 @@ def pack(picture: Picture, at: float) -> bytes:
 def unpack(data: bytes) -> Exposure:
     """The exposure that `pack` has packed."""
     return msgspec.msgpack.decode(data, type=Exposure)
+
+
+def pack_inertial(sample: Inertial) -> bytes:
+    """A sample on the wire: angular velocity and specific force, 6 numbers."""
+    return np.concatenate([sample.rate, sample.force]).astype("<f8").tobytes()
+
+
+def unpack_inertial(data: bytes) -> Inertial:
+    """The sample that `pack_inertial` has packed."""
+    values = np.frombuffer(data, "<f8", 6)
+    return Inertial(values[:3].copy(), values[3:].copy())

@@ -1,4 +1,4 @@
-"""The RealSense camera on the hand: pictures on demand, from a thread that reads the stream."""
+"""The RealSense camera on the hand: pictures on demand, from a thread that reads the stream, and inertial samples."""
 
 import threading
 import time
@@ -7,12 +7,16 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from bridge.core.attitude import Inertial
 from bridge.core.picture import Picture, encode_picture
 from bridge.real.config import CameraConfig
 from rolling_panda.errors import InputError
 from rolling_panda.messages.robot import Intrinsics
+from rolling_panda.model.differential_drive import Array
 
 _WAIT_MS = 1000
+#: Samples of the inertial sensors come every 5 ms; older than this they tell nothing of now (s).
+_FRESH_S = 0.05
 
 
 class Frames(Protocol):
@@ -25,17 +29,48 @@ class Frames(Protocol):
         """Stop the stream."""
 
 
+class Motion(Protocol):
+    """Stream of a gyroscope and an accelerometer."""
+
+    def newest(self) -> Inertial | None:
+        """The newest sample; None before the first one of both, and where none has come for a while."""
+
+    def close(self) -> None:
+        """Stop the stream."""
+
+
+class MotionSamples:
+    """The newest sample of each sensor; librealsense's threads call it with each."""
+
+    def __init__(self) -> None:
+        """None yet."""
+        self._newest: dict[str, tuple[float, Array]] = {}
+
+    def __call__(self, frame: Any) -> None:
+        """Take in a frame."""
+        if not frame.is_motion_frame():
+            return
+        told = frame.as_motion_frame().get_motion_data()
+        self._newest[frame.get_profile().stream_type().name] = time.monotonic(), np.array([told.x, told.y, told.z])
+
+    def newest(self) -> Inertial | None:
+        """As of `Motion`."""
+        (at, rate), (then, force) = (self._newest.get(name, (-1.0, np.zeros(3))) for name in ("gyro", "accel"))
+        return Inertial(rate, force) if time.monotonic() - min(at, then) < _FRESH_S else None
+
+
 class RealSense:
     """Implements the camera's part of the robot. `capture` returns at once."""
 
-    def __init__(self, frames: Frames, align: Any) -> None:
+    def __init__(self, frames: Frames, align: Any, motion: Motion | None = None) -> None:
         """Begin to take frames.
 
         Args:
             frames: Open stream; closed with the camera.
             align: librealsense's filter that puts depth into the colour image.
+            motion: Open stream of inertial samples; closed with the camera. None where they are not used.
         """
-        self._frames, self._align = frames, align
+        self._frames, self._align, self._motion = frames, align, motion
         self._asked, self._closing = threading.Event(), threading.Event()
         self._asked_at = 0.0
         self._ready: Picture | None = None
@@ -51,12 +86,18 @@ class RealSense:
         picture, self._ready = self._ready, None
         return picture
 
+    def inertial(self) -> Inertial | None:
+        """The newest sample of the inertial sensors."""
+        return None if self._motion is None else self._motion.newest()
+
     def close(self) -> None:
         """Stop; safe to call twice."""
         if not self._closing.is_set():
             self._closing.set()
             self._thread.join()
             self._frames.close()
+            if self._motion is not None:
+                self._motion.close()
 
     def _run(self) -> None:
         while not self._closing.is_set():
@@ -105,11 +146,31 @@ class _Pipeline:
         self._pipeline.stop()
 
 
-def open_realsense(config: CameraConfig) -> RealSense:
+class _MotionPipeline(MotionSamples):
+    """A pipeline of its own: that of the pictures waits for a picture with each sample."""
+
+    def __init__(self, rs: Any, serial: str) -> None:
+        super().__init__()
+        self._pipeline, settings = rs.pipeline(), rs.config()
+        if serial:
+            settings.enable_device(serial)
+        settings.enable_stream(rs.stream.gyro)
+        settings.enable_stream(rs.stream.accel)
+        self._pipeline.start(settings, self)
+
+    def close(self) -> None:
+        self._pipeline.stop()
+
+
+def open_realsense(config: CameraConfig, inertial: bool = False) -> RealSense:
     """The camera with the configured serial number, or the only one there is.
 
+    Args:
+        config: Which camera, and its pictures.
+        inertial: Whether its gyroscope and accelerometer are read too.
+
     Raises:
-        InputError: The driver is not installed, or there is no such camera.
+        InputError: The driver is not installed, there is no such camera, or it has no inertial sensors.
     """
     try:
         import pyrealsense2 as rs
@@ -129,4 +190,12 @@ def open_realsense(config: CameraConfig) -> RealSense:
         pipeline.start(settings)
     except RuntimeError as error:
         raise InputError(f"the RealSense camera does not stream: {error}; check its USB 3 cable") from error
-    return RealSense(_Pipeline(pipeline), rs.align(rs.stream.color))
+    try:
+        motion = _MotionPipeline(rs, config.serial) if inertial else None
+    except RuntimeError as error:
+        pipeline.stop()
+        raise InputError(
+            f"the RealSense camera tells no motion: {error}; only models with an i, such as the D435i, have inertial "
+            "sensors: with another one set [bridge] inertial = false"
+        ) from error
+    return RealSense(_Pipeline(pipeline), rs.align(rs.stream.color), motion)

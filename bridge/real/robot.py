@@ -5,6 +5,7 @@ from typing import Protocol
 
 import numpy as np
 
+from bridge.core.attitude import Inertial
 from bridge.core.interface import Measurement, Setpoint
 from bridge.core.picture import Picture
 from bridge.real.arm_link import ArmState
@@ -70,6 +71,9 @@ class Camera(Protocol):
     def capture(self, expose: bool) -> Picture | None:
         """Ask for a picture, or fetch one."""
 
+    def inertial(self) -> Inertial | None:
+        """The newest sample of its inertial sensors; None without them."""
+
     def close(self) -> None:
         """Let go."""
 
@@ -107,6 +111,7 @@ class RealRobot:
             battery=_fraction(base.battery),
             arm_success=_fraction(arm.success_rate) if arm.commands > 0 else None,
             external_torque=arm.external_torque,
+            inertial=None if self._camera is None else self._camera.inertial(),
         )
 
     def write(self, setpoint: Setpoint) -> None:

@@ -11,8 +11,9 @@ import pyrealsense2 as rs
 from numpy.typing import NDArray
 from PIL import Image
 
-from bridge.real.picture_link import KEY, Exposure, unpack
-from bridge.real.realsense import RealSense
+from bridge.core.attitude import Inertial
+from bridge.real.picture_link import INERTIAL_KEY, KEY, Exposure, unpack, unpack_inertial
+from bridge.real.realsense import MotionSamples, RealSense
 from rolling_panda.messages.robot import Intrinsics
 from rolling_panda.transport.zenoh import ForeignWire
 
@@ -111,9 +112,57 @@ class WireFrames:
         self._device.show(*_images(exposure), exposure.at)
 
 
-def open_fake_realsense(wire: ForeignWire, rate_hz: int) -> RealSense:
-    """The camera's own driver on frames that come over the wire."""
-    return RealSense(WireFrames(wire, rate_hz), rs.align(rs.stream.color))
+class SoftwareMotion(MotionSamples):
+    """Gyroscope and accelerometer of one camera; `newest` returns what was felt last."""
+
+    def __init__(self) -> None:
+        """Streaming, nothing felt yet."""
+        super().__init__()
+        self._device = rs.software_device()
+        self._sensor = self._device.add_sensor("Motion Module")
+        self._profiles = [self._stream(rs.stream.gyro, 4), self._stream(rs.stream.accel, 5)]
+        self._sensor.open(self._profiles)
+        self._sensor.start(self)
+        self._number = 0
+
+    def feel(self, sample: Inertial) -> None:
+        """One sample of both."""
+        self._number += 1
+        for profile, values in zip(self._profiles, (sample.rate, sample.force), strict=True):
+            frame, data = rs.software_motion_frame(), rs.vector()
+            data.x, data.y, data.z = values.tolist()
+            frame.data, frame.profile = data, profile.as_motion_stream_profile()
+            frame.timestamp, frame.frame_number = 1e3 * time.time(), self._number
+            frame.domain = rs.timestamp_domain.system_time
+            self._sensor.on_motion_frame(frame)
+
+    def close(self) -> None:
+        """Stop both streams."""
+        self._sensor.stop()
+        self._sensor.close()
+
+    def _stream(self, kind: Any, uid: int) -> Any:
+        stream, scale = rs.motion_stream(), rs.motion_device_intrinsic()
+        scale.data = np.eye(3, 4).tolist()
+        scale.noise_variances = scale.bias_variances = [0.0] * 3
+        stream.type, stream.index, stream.uid, stream.fps = kind, 0, uid, 200
+        stream.fmt, stream.intrinsics = rs.format.motion_xyz32f, scale
+        return self._sensor.add_motion_stream(stream)
+
+
+class WireMotion(SoftwareMotion):
+    """Implements the driver's `Motion` with samples that come over the wire."""
+
+    def __init__(self, wire: ForeignWire) -> None:
+        """Listen; the wire belongs to the frames."""
+        super().__init__()
+        wire.subscribe(INERTIAL_KEY, lambda data, _: self.feel(unpack_inertial(data)))
+
+
+def open_fake_realsense(wire: ForeignWire, rate_hz: int, inertial: bool = False) -> RealSense:
+    """The camera's own driver on frames, and inertial samples, that come over the wire."""
+    motion = WireMotion(wire) if inertial else None
+    return RealSense(WireFrames(wire, rate_hz), rs.align(rs.stream.color), motion)
 
 
 def _images(exposure: Exposure) -> tuple[NDArray[np.uint16], NDArray[np.uint8]]:

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Literal
 
 from bridge.config import BridgeConfig
+from bridge.core.attitude import BaseOrientation
 from bridge.core.bridge import TICK_S, BridgeCore
 from bridge.core.calibration import AS_DRAWN, Calibration, Keep, forget
 from bridge.core.cut_orders import CutMemory
@@ -56,7 +57,8 @@ def simulated_bridge(
     config = load_section(config_path, "bridge", BridgeConfig)
     limits = load_section(config_path, "robot", RobotConfig)
     model = RobotModel(limits)
-    odometer = Odometer(model.drive, config.odometry, TICK_S, seed)
+    orientation = BaseOrientation(RobotModel(limits)) if config.inertial else None
+    odometer = Odometer(model.drive, config.odometry, TICK_S, seed, orientation)
     robot = simulated_robot(config_path, seed, trace, camera)
     widened = (*wider("bridge", config), *wider("robot", limits))
     calibration = Calibration(model.drive.sizes, float(model.limits.velocity[0]), calibrated, keep)

@@ -159,7 +159,7 @@ class Body:
         #: The way here, oldest spot first: positions of ξ (9) and of the tool (3, m, odom).
         self.trail: deque[tuple[Array, Array]] = deque(maxlen=_TRAIL)
         self.measured: Measured | None = None
-        #: Where odom is in map, as told last.
+        #: Where odom is in map, and how the base stands, as told last.
         self.frame = MapFrame()
         #: Obstacles in odom.
         self.obstacles: Received[Obstacles] | None = None
@@ -208,12 +208,14 @@ class Body:
 
     def _locate(self, inbox: Inbox) -> None:
         """Take in where odom is in map, and the obstacles in odom."""
-        told, around = inbox.newest(Localisation), inbox.newest(Obstacles)
+        told, around, odometry = inbox.newest(Localisation), inbox.newest(Obstacles), inbox.newest(Odometry)
         if told is not None:
             self.frame = self.frame.after(told.message)
+        if odometry is not None:
+            self.frame = self.frame.standing(odometry.message)
         if self._told != (around, self.frame):
             self._told, self.obstacles = (around, self.frame), around
-            if around is not None and self.frame.T_map_odom is not None:
+            if around is not None and self.frame.T_map_level is not None:
                 capsules = self.frame.capsules_in_odom(around.message.capsules)
                 in_odom = Obstacles(header=m.Header(around.message.header.stamp, "odom"), capsules=capsules)
                 self.obstacles = Received(in_odom, around.at)

@@ -388,11 +388,20 @@ class ToolMotion:
         # At the speed of the last part, so that a late correction does not accelerate the blades.
         rates = Rates(config.cut_speed, config.tool_acceleration, config.tool_jerk)
         made = Correction.within(self.time, by, base, rates)
+        self._keep_ended()
         self._corrections.append(made)
         self.goal = pin.SE3(self.goal.rotation, self.goal.translation + by)
         self.q_goal = self.q_goal.copy()
         self.q_goal[:2] += base
         self.duration = max(self.duration, made.end)
+
+    def _keep_ended(self) -> None:
+        """Corrections that have been made become part of where the motion began: uneven ground asks for many."""
+        for each in [each for each in self._corrections if each.end <= self.time]:
+            self._corrections.remove(each)
+            self._start = pin.SE3(self._start.rotation, self._start.translation + each.by)
+            if self._free is not None:
+                self._q_start = self._q_start + np.pad(each.base, (0, len(self._q_start) - 2))
 
     def settle(self, q: Array) -> None:
         """Hold the tool at its desired pose, with the arm posture of q (12); effective once."""

@@ -730,11 +730,21 @@ class Advance(MovingStage):
     """Straight into the canes.
 
     Where a close-up has told the place, the way ends there. From now on the tool hides it from the camera, and where
-    odom is in map may be told otherwise meanwhile.
+    odom is in map may be told otherwise meanwhile. How the base stands is known all the time.
     """
 
     phase: m.Phase = "ADVANCE"
     in_canes = True
+
+    def _follow_ground(self, robot: Measured) -> None:
+        """Keep the goal in its place in odom while the base rolls over uneven ground."""
+        before, now = self._task.frame.T_odom_level, robot.frame.T_odom_level
+        if now is before:
+            return
+        self._task = replace(self._task, frame=replace(self._task.frame, T_odom_level=now))
+        goal = self._way.motion.goal.translation
+        place = goal if before is None else before.act(goal)
+        self._way.motion.shift((place if now is None else now.actInv(place)) - goal)
 
     def step(self, robot: Measured, now: float) -> Step:
         """One period."""
@@ -743,6 +753,7 @@ class Advance(MovingStage):
         if left or parts.ending:
             stage, result = self._retreat(robot).step(robot, now)
             return stage, result.with_event(left) if left else result
+        self._follow_ground(robot)
         if config.work.pre_cut_check:
             parts.servo.correct(motion, robot)
         else:

@@ -211,7 +211,7 @@ class CutPlan:
 
     def in_odom(self, frame: MapFrame) -> "CutPlan":
         """The plan in odom of one in map."""
-        if frame.T_map_odom is None:
+        if frame.T_map_level is None:
             return self
         poses = CutPoses(*map(frame.pose_in_odom, self.poses.way))
         q_clear, q_stand_off, q_cut = map(frame.configuration_in_odom, (self.q_clear, self.q_stand_off, self.q_cut))

@@ -29,6 +29,8 @@ X, Y, Z, RX, RY, RZ = range(6)
 _SLIP, _CORRELATED, _HALF_TRACK = 0.035, 0.5, 0.28
 #: Height (m) and tilt (rad) of the base on uneven ground (SD), and the way over which they change (m).
 _HEIGHT, _TILT, _UNEVEN = 0.008, 0.015, 0.4
+#: The same where inertial sensors tell how the base stands, and of its heading over a metre (rad).
+_MEASURED_HEIGHT, _MEASURED_TILT, _GYROSCOPE = 0.005, 0.004, 0.004
 #: Standard deviation of a sample across its line by kind (m): depth, centre line, wind.
 _NOISE = {CANE: 0.004, UPRIGHT: 0.005, ALONG: 0.005, WIRES: 0.008}
 #: What the samples of one frame have in common: tilt while driving, wind, depth (m and rad, SD).
@@ -151,8 +153,8 @@ class RowLocaliser:
         """Forget the wood that was seen; the pose stays."""
         self._map = RowMap()
 
-    def predict(self, base: Array, stamp: float) -> Estimate:
-        """Advance to a pose of the base in odom (3) at a time (s).
+    def predict(self, base: Array, stamp: float, inertial: bool = False) -> Estimate:
+        """Advance to a pose of the base in odom (3) at a time (s), which `inertial` sensors have corrected or not.
 
         A clock that starts anew, or odometry that does, leaves the base where it was in the map, but lost: wood has to
         be recognised before the place counts as known again. A frame that comes late changes nothing.
@@ -171,7 +173,7 @@ class RowLocaliser:
         if np.hypot(moved[0], moved[1]) > _FASTEST * passed + _JUMP or abs(moved[2]) > _TURNS * passed + _JUMP:
             return self._anew(base, stamp, "odometry jumped")
         self._speed = float(np.hypot(moved[0], moved[1])) / max(passed, 0.1)
-        self._advance(base)
+        self._advance(base, inertial)
         self._odom, self._stamp = base.copy(), stamp
         if self.spread > _LOST and self._map.cameras and self._state != "lost":
             self._lost("too far without wood")
@@ -240,7 +242,7 @@ class RowLocaliser:
         P = self._covariance
         return float(np.sqrt(max(P[X, X] + P[RZ, RZ] - 2 * P[X, RZ], 0.0)))
 
-    def _advance(self, base: Array) -> None:
+    def _advance(self, base: Array, inertial: bool) -> None:
         assert self._odom is not None
         c, s = np.cos(self._pose[RZ] - self._odom[2]), np.sin(self._pose[RZ] - self._odom[2])
         dx, dy = base[:2] - self._odom[:2]
@@ -265,8 +267,9 @@ class RowLocaliser:
         heading = self._pose[RZ] + turned / 2
         along = np.array([np.cos(heading), np.sin(heading)])
         P[:2, :2] += grown / 2 * np.outer(along, along) + 0.02 * grown * np.eye(2)
-        P[RZ, RZ] += grown / (2 * _HALF_TRACK**2)
-        for index, spread in ((Z, _HEIGHT), (RX, _TILT), (RY, _TILT)):
+        P[RZ, RZ] += _GYROSCOPE**2 * rolled if inertial else grown / (2 * _HALF_TRACK**2)
+        height, tilt = (_MEASURED_HEIGHT, _MEASURED_TILT) if inertial else (_HEIGHT, _TILT)
+        for index, spread in ((Z, height), (RX, tilt), (RY, tilt)):
             P[index, index] += (1.0 - stays**2) * spread**2
         self._covariance = P
         self._pose[[X, Y]] += step

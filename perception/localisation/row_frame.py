@@ -96,10 +96,10 @@ class RowFrame:
         """Forget the wood, which another calibration sees elsewhere; what is known of the place stays."""
         self._localiser.forget()
 
-    def predict(self, base: Array, stamp: float) -> None:
-        """The base is at a pose in odom (3) at a time (s)."""
+    def predict(self, base: Array, stamp: float, inertial: bool = False) -> None:
+        """The base is at a pose in odom (3) at a time (s), which `inertial` sensors have corrected or not."""
         if self._on:
-            self._localiser.predict(base, stamp)
+            self._localiser.predict(base, stamp, inertial)
 
     def update(self, view: View, labels: Labels, canes: Sequence[Axis]) -> None:
         """Compare a frame, in odom, with the wood that was seen before."""

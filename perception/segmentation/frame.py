@@ -15,7 +15,8 @@ from rolling_panda import reasons
 from rolling_panda.errors import InputError, MessageError
 from rolling_panda.messages.robot import CameraFrame, Intrinsics
 from rolling_panda.messages.types import WOOD_CLASSES, Reason
-from rolling_panda.model.robot import RobotModel, configuration
+from rolling_panda.model.base_attitude import camera_in_odom
+from rolling_panda.model.robot import RobotModel
 from rolling_panda.reasons import text_of
 
 #: Class indices, in the order of `WOOD_CLASSES`.
@@ -145,7 +146,7 @@ def decode_frame(frame: CameraFrame, model: RobotModel) -> View:
         labels = _image(frame.labels_zlib, k, "u1", "label", frame.sequence)
         if labels.max(initial=0) >= len(WOOD_CLASSES):
             raise CorruptFrameError(reasons.frame_class_unknown(frame.sequence, float(labels.max()), len(WOOD_CLASSES)))
-    T_odom_camera = model.pose(configuration(frame.base, frame.position), model.camera_id)
+    T_odom_camera = camera_in_odom(frame, model)
     return View(
         sequence=frame.sequence,
         stamp=frame.header.stamp,

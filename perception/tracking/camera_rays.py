@@ -4,11 +4,12 @@ import threading
 from dataclasses import dataclass
 
 import numpy as np
+from msgspec.structs import replace
 
 from perception.arrays import Array
-from rolling_panda import messages as m
-from rolling_panda.messages.robot import CameraFrame, Intrinsics
-from rolling_panda.model.robot import RobotModel, configuration
+from rolling_panda.messages.robot import CameraFrame
+from rolling_panda.model.base_attitude import camera_in_odom
+from rolling_panda.model.robot import RobotModel
 
 #: Frames that can be clicked: ten minutes at two a second.
 _MAX_FRAMES = 1200
@@ -23,17 +24,18 @@ class Ray:
 
 
 class CameraRays:
-    """Stores the joint positions of frames. Thread-safe: the loop adds frames, the worker asks for rays."""
+    """Stores how the robot stood in frames. Thread-safe: the loop adds frames, the worker asks for rays."""
 
     def __init__(self) -> None:
         """Start without frames."""
-        self._frames: dict[int, tuple[Intrinsics, m.PlanarPose, m.Actuated]] = {}
+        self._frames: dict[int, CameraFrame] = {}
         self._lock = threading.Lock()
 
     def add(self, frame: CameraFrame) -> None:
         """Store the camera pose of a frame; the oldest is dropped."""
         with self._lock:
-            self._frames[frame.sequence] = frame.intrinsics, frame.base, frame.position
+            # Without the pictures, which are most of it.
+            self._frames[frame.sequence] = replace(frame, color_jpeg=b"", depth_zlib=b"", labels_zlib=b"")
             while len(self._frames) > _MAX_FRAMES:
                 del self._frames[next(iter(self._frames))]
 
@@ -50,9 +52,7 @@ class CameraRays:
             stored = self._frames.get(sequence)
         if stored is None:
             return None
-        reported, base, position = stored
-        k = model.lens(reported)
-        camera = model.pose(configuration(base, position), model.camera_id)
+        k, camera = model.lens(stored.intrinsics), camera_in_odom(stored, model)
         col, row = u * k.width - 0.5, v * k.height - 0.5
         along = np.array([(col - k.cx) / k.fx, (row - k.cy) / k.fy, 1.0])
         direction = np.array(camera.rotation) @ (along / np.linalg.norm(along))

@@ -41,6 +41,7 @@ FIELD = (
     "battery_state",
     "cutter/close",
     "fake-camera/exposure",
+    "fake-camera/inertial",
 )
 _HOST = "127.0.0.1"
 

@@ -9,6 +9,7 @@ from rolling_panda.messages.types import (
     Actuated,
     ActuatedVelocity,
     ArmTorques,
+    BaseAttitude,
     BridgeKind,
     Count,
     Epoch,
@@ -127,14 +128,15 @@ class JointState(Message, frozen=True, kw_only=True):
 
 
 class Odometry(Message, frozen=True, kw_only=True):
-    """Bridge → all: wheel odometry of the base.
+    """Bridge → all: odometry of the base, from the wheels and, where they are used, the camera's inertial sensors.
 
     Attributes:
         header: `frame_id` is odom.
         sequence: Strictly increasing.
-        pose: base_link in odom.
+        pose: base_link in odom, on the plane.
         linear: Forward velocity of the axle centre (m/s).
         angular: Yaw rate (rad/s).
+        attitude: How the base stands on the ground; None without inertial sensors.
     """
 
     header: Header
@@ -142,6 +144,7 @@ class Odometry(Message, frozen=True, kw_only=True):
     pose: PlanarPose
     linear: Speed
     angular: Speed
+    attitude: BaseAttitude | None = None
 
 
 class RejectionCount(Struct, frozen=True, forbid_unknown_fields=True):
@@ -337,6 +340,7 @@ class CameraFrame(Message, frozen=True, kw_only=True):
             track (m). None for those drawn.
         joint_offsets: Offsets of the arm's joints that were taken from what its encoders told (rad).
         velocity: Measured actuated velocities at exposure (rad/s); None in recordings of earlier versions.
+        attitude: How the base stood on the ground at exposure; None without inertial sensors.
     """
 
     header: Header
@@ -353,3 +357,4 @@ class CameraFrame(Message, frozen=True, kw_only=True):
     wheels: tuple[Radius, Radius, Track] | None = None
     joint_offsets: JointOffsets = NO_OFFSETS
     velocity: ActuatedVelocity | None = None
+    attitude: BaseAttitude | None = None

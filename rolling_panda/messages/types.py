@@ -11,6 +11,7 @@ Unit = Annotated[float, Meta(ge=-1.001, le=1.001)]
 NonNegative = Annotated[float, Meta(ge=0.0, le=1e9)]
 Fraction = Annotated[float, Meta(ge=0.0, le=1.0)]
 Angle = Annotated[float, Meta(ge=-1e6, le=1e6)]
+Tilt = Annotated[float, Meta(ge=-0.5, le=0.5)]
 Speed = Annotated[float, Meta(ge=-100.0, le=100.0)]
 Count = Annotated[int, Meta(ge=0, le=2**62)]
 #: The epoch increases by one with each fencing token that the bridge issues. At one a second this lasts for 30 years.
@@ -94,6 +95,23 @@ class PlanarPose(Struct, frozen=True, forbid_unknown_fields=True):
     x: Metre = 0.0
     y: Metre = 0.0
     phi: Angle = 0.0
+
+
+class BaseAttitude(Struct, frozen=True, forbid_unknown_fields=True):
+    """How base_link stands on uneven ground, beyond its pose on the plane: T_odom_base = plane pose · attitude.
+
+    The plane is that of the ground where the robot was switched on. Signs are those of REP-103. The poses that the
+    controller tells of the tool are of a base that stands level.
+
+    Attributes:
+        height: Above the plane (m).
+        roll: About the x axis, left side up (rad).
+        pitch: About the y axis, nose down (rad).
+    """
+
+    height: Metre = 0.0
+    roll: Tilt = 0.0
+    pitch: Tilt = 0.0
 
 
 class Heartbeat(Message, frozen=True, kw_only=True):

@@ -172,10 +172,12 @@ class RobotLink:
 
     @property
     def map_frame(self) -> MapFrame:
-        """Where odom is in map."""
-        told = self._localisation.peek()
+        """Where odom is in map, and how the base stands."""
+        told, odometry = self._localisation.peek(), self.odometry.peek()
         if told is not None:
             self._map_frame = self._map_frame.after(told.message)
+        if odometry is not None:
+            self._map_frame = self._map_frame.standing(odometry.message)
         return self._map_frame
 
     def posture(self, now: float) -> Posture | None:

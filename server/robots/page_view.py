@@ -14,7 +14,7 @@ from rolling_panda.messages.robot import CameraFrame, JointState
 from rolling_panda.messages.supervision import SessionPlan
 from rolling_panda.messages.types import Role
 from rolling_panda.model.map_frame import MapFrame
-from rolling_panda.model.robot import ARM_Q, Limits, RobotModel, configuration, placement, pose_message
+from rolling_panda.model.robot import ARM_Q, Limits, RobotModel, placement, pose_message
 from rolling_panda.model.wire_values import vector3
 from server.auth.sessions import Session
 from server.robots.link import RobotLink
@@ -109,7 +109,7 @@ class PageView:
     def in_odom(self, T_map_tool: m.Pose) -> m.Pose:
         """T_odom_tool of a pose of the tool in map."""
         where = self._link.map_frame
-        return T_map_tool if where.T_map_odom is None else pose_message(where.pose_in_odom(placement(T_map_tool)))
+        return T_map_tool if where.T_map_level is None else pose_message(where.pose_in_odom(placement(T_map_tool)))
 
     def camera(self, frame: CameraFrame) -> m.Pose:
         """T_map_camera when a frame was taken."""
@@ -204,7 +204,7 @@ def addressed(state: PageState, session: Session) -> PageState:
 
 def camera_pose(frame: CameraFrame, model: RobotModel, where: MapFrame) -> Any:
     """T_map_camera (pin.SE3) when a frame was taken."""
-    return where.pose_in_map(model.pose(configuration(frame.base, frame.position), model.camera_id))
+    return where.camera(frame, model)
 
 
 def project(

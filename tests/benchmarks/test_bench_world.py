@@ -53,6 +53,13 @@ def test_shares_are_of_the_accepted_and_of_the_cuts_that_were_made() -> None:
     assert low is not None and high is not None and low < 3 / 7 < high
 
 
+def test_what_the_truth_leaves_no_room_for_is_no_failure_of_the_robot() -> None:
+    blocked = replace(cut("UNREACHABLE", False, past=None), blocked="cane")
+    figures = bench.summarise([run(cut(), cut(right=False), blocked, replace(cut(), blocked="wire"))])
+    assert (figures["right"].value, figures["right"].n) == (pytest.approx(2 / 4), 4)
+    assert (figures["right_of_possible"].value, figures["right_of_possible"].n) == (pytest.approx(1 / 2), 2)
+
+
 def test_outcomes_are_held_against_what_was_severed() -> None:
     severed, missed = replace(cut(), tool_error=0.001, distance=0.001), replace(cut(), tool_error=0.001, distance=None)
     told_not_cut = replace(severed, state="FAILED_NOT_CUT")
@@ -72,9 +79,13 @@ def test_minutes_of_work_for_a_stop_are_told_beside_the_times_a_person_came() ->
 
 def test_what_was_run_is_on_disk_and_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     worlds: list[tuple[int, WorldConfig]] = []
+    offsets: list[float] = []
 
-    def worked_off(seed, points, method, pictures, segmenter, world, checked, localise, supervised, servo):
+    def worked_off(
+        seed, points, method, pictures, segmenter, world, checked, localise, supervised, servo, frame_time_offset
+    ):
         worlds.append((seed, world))
+        offsets.append(frame_time_offset)
         return run() if world.depth_lost == PRESETS["storm"].depth_lost else run(cut(), cut(right=world == CALM))
 
     monkeypatch.setattr(bench, "cut_row", worked_off)
@@ -86,6 +97,11 @@ def test_what_was_run_is_on_disk_and_drawn(tmp_path: Path, monkeypatch: pytest.M
     assert summary["all, calm"]["right"]["value"] == 1.0 and summary["all, field"]["right"]["value"] == 0.5
     assert summary["all, storm"]["right"]["value"] is None, "nothing was proposed"
     assert bench.main(["--each", "--count", "1", "--json", str(tmp_path / "world_each.json")]) == 0
+    assert set(offsets) == {0.0}
+    assert bench.main(["--preset", "storm", "--calibrated", "--count", "1", "--json", str(tmp_path / "c.json")]) == 0
+    (_, storm), late = worlds[-1], offsets[-1]
+    assert storm.hand_eye_angle < PRESETS["field"].hand_eye_angle and storm.slip == PRESETS["storm"].slip
+    assert late == PRESETS["storm"].frame_delay
     figure = Figure()
     draw_world(tmp_path, figure)
     assert {axes.get_title() for axes in figure.axes if axes.get_visible()} >= {"all (n 4)", "slip (n 2)"}

@@ -7,8 +7,10 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from bridge.config import BridgeConfig
+from bridge.core.attitude import BaseOrientation
 from bridge.core.bridge import TICK_S, BridgeCore
 from bridge.core.odometer import Odometer
 from bridge.core.robot_time import RealTime, SteppedTime
@@ -19,7 +21,7 @@ from rolling_panda import messages as m
 from rolling_panda.config import load_section
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.model.differential_drive import Array
-from rolling_panda.model.robot import ARM_Q
+from rolling_panda.model.robot import ARM_Q, RobotModel
 from rolling_panda.reasons import said
 from rolling_panda.resources import resource
 from tests.support.bridge_rig import FORWARD, MODEL, REST, NoCamera, Parts, Rig, SimulatedPlant
@@ -29,11 +31,12 @@ pytestmark = pytest.mark.long
 
 
 def simulated() -> Parts:
-    config = load_section(resource("assets/config/sim.toml"), "bridge", BridgeConfig)
+    config = replace(load_section(resource("assets/config/sim.toml"), "bridge", BridgeConfig), inertial=True)
     plant = SimulatedPlant(SimulatedRobot(config, Row(()), NoCamera()))
 
     def start() -> BridgeCore:
-        return BridgeCore(plant, config, MODEL.limits, Odometer(MODEL.drive, config.odometry, TICK_S), "sim")
+        odometer = Odometer(MODEL.drive, config.odometry, TICK_S, 0, BaseOrientation(RobotModel()))
+        return BridgeCore(plant, config, MODEL.limits, odometer, "sim")
 
     return Parts(start, plant, lambda: SteppedTime(0.0, TICK_S), real=False, close=plant.robot.close)
 
@@ -89,6 +92,16 @@ def test_base_and_arm_follow_and_the_telemetry_says_what_they_do(rig: Rig) -> No
     assert odometry.pose.x > 0.1
     assert not rig.state.watchdog
     assert rig.plant.breaches() == []
+
+
+def test_how_the_base_stands_is_told_with_the_odometry_and_each_picture(rig: Rig) -> None:
+    rig.run(1.0, REST)
+    told = [out.odometry.attitude for out in rig.outputs if out.odometry]
+    told += [out.frame.attitude for out in rig.outputs if out.frame]
+    assert len(told) > 10
+    for attitude in told:
+        assert attitude is not None
+        assert (attitude.height, attitude.roll, attitude.pitch) == pytest.approx((0.0, 0.0, 0.0), abs=2e-3)
 
 
 def test_calibrated_wheels_turn_as_the_ground_needs_and_the_odometry_tells_the_way(rig: Rig) -> None:

@@ -2,22 +2,28 @@ import numpy as np
 import pytest
 
 from bridge.config import OdometryConfig
+from bridge.core.interface import NO_CUT, Measurement
 from bridge.core.odometer import Odometer
 from rolling_panda import messages as m
+from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import RobotModel
 
 DRIVE = RobotModel().drive
 TICK = 0.001
 
 
+def measured(wheels: Array) -> Measurement:
+    return Measurement(np.array([*wheels, *np.zeros(7)]), np.zeros(9), "open", "", "", NO_CUT)
+
+
 def drive(config: OdometryConfig, seed: int = 0, v: float = 0.3, omega: float = 0.2) -> list[tuple[int, m.Odometry]]:
     """Two seconds at constant speed; each message with the tick at which it came out."""
     odometer, wheels, speeds = Odometer(DRIVE, config, TICK, seed), np.zeros(2), np.array(DRIVE.wheels(v, omega))
-    odometer.follow(wheels)
+    odometer.follow(measured(wheels), 0.0)
     out = []
     for tick in range(1, 2001):
         wheels = wheels + speeds * TICK
-        odometer.follow(wheels)
+        odometer.follow(measured(wheels), tick * TICK)
         if tick % 20 == 0:
             odometer.measure(tick, tick * TICK, speeds)
         message = odometer.due(tick)

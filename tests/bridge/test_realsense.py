@@ -16,13 +16,15 @@ need("real")
 
 import pyrealsense2 as rs
 
+from bridge.core.attitude import Inertial
 from bridge.core.picture import DEPTH_UNIT, Picture
 from bridge.real.config import CameraConfig
+from bridge.real.picture_link import INERTIAL_KEY, pack_inertial
 from bridge.real.realsense import (
     RealSense,
     open_realsense,
 )
-from bridge.real.software_realsense import SoftwareDevice
+from bridge.real.software_realsense import SoftwareDevice, SoftwareMotion, WireMotion
 from rolling_panda.errors import InputError
 from rolling_panda.messages.robot import Intrinsics
 
@@ -82,6 +84,41 @@ def test_a_picture_is_taken_when_asked_for_and_no_other(camera: RealSense, devic
     device.wall(800, 220)
     time.sleep(0.1)
     assert camera.capture(False) is None, "one picture for one request"
+
+
+def test_the_newest_of_both_inertial_sensors_is_told_while_it_is_fresh(device: SoftwareCamera) -> None:
+    motion = SoftwareMotion()
+    camera = RealSense(device, rs.align(rs.stream.color), motion)
+    assert camera.inertial() is None
+    motion.feel(Inertial(np.array([0.1, -0.2, 0.3]), np.array([0.0, -9.81, 0.5])))
+    told = camera.inertial()
+    assert told is not None
+    assert told.rate == pytest.approx([0.1, -0.2, 0.3]) and told.force == pytest.approx([0.0, -9.81, 0.5])
+    motion.feel(Inertial(np.array([0.4, 0.0, 0.0]), np.array([0.0, -9.8, 0.0])))
+    newer = camera.inertial()
+    assert newer is not None and newer.rate == pytest.approx([0.4, 0.0, 0.0])
+    time.sleep(0.1)
+    assert camera.inertial() is None, "a camera that has fallen silent does not go on turning"
+    camera.close()
+
+
+def test_samples_come_over_the_wire_as_they_were_sent() -> None:
+    heard: dict[str, Callable[[bytes, float], None]] = {}
+
+    class Wire:
+        def subscribe(self, key: str, callback: Callable[[bytes, float], None]) -> None:
+            heard[key] = callback
+
+    motion = WireMotion(Wire())  # type: ignore[arg-type]
+    heard[INERTIAL_KEY](pack_inertial(Inertial(np.array([0.5, -0.25, 2.0]), np.array([1.0, -9.5, 0.125]))), 0.0)
+    told = motion.newest()
+    motion.close()
+    assert told is not None
+    assert told.rate.tolist() == [0.5, -0.25, 2.0] and told.force.tolist() == [1.0, -9.5, 0.125]
+
+
+def test_a_camera_whose_inertial_sensors_are_not_read_tells_none(camera: RealSense) -> None:
+    assert camera.inertial() is None
 
 
 def test_without_a_camera_it_says_what_to_check() -> None:

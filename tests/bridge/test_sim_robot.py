@@ -5,12 +5,16 @@ import msgspec
 import numpy as np
 import pytest
 
-from bridge.config import BridgeConfig
+from bridge.config import BridgeConfig, OdometryConfig
+from bridge.core.attitude import BaseOrientation
 from bridge.core.interface import Setpoint
+from bridge.core.odometer import Odometer
 from bridge.sim.robot.robot import SimulatedRobot, VelocityServos
 from bridge.sim.robot.trace import TraceWriter, read
 from bridge.sim.vineyard.row import Rod, Row
+from bridge.sim.world.config import PRESETS
 from rolling_panda.config import load_section
+from rolling_panda.model.base_attitude import attitude_of
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.resources import resource
 from tests.support.cameras import Blind
@@ -40,6 +44,34 @@ def test_odometry_from_the_wheels_stays_with_the_true_base(v: float, omega: floa
     assert abs(true[2] - 2.5 * omega) < 0.02
     assert np.linalg.norm(true[:2] - pose[:2]) < 0.0005 + 0.002 * metres
     assert abs(true[2] - pose[2]) < np.radians(0.02 + 0.2 * turn / (np.pi / 2))
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_inertial_sensors_keep_the_heading_where_wheels_slip_and_tell_how_the_base_stands(seed: int) -> None:
+    config = msgspec.structs.replace(CONFIG, inertial=True)
+    world = msgspec.structs.replace(PRESETS["field"], cane_modulus=0.0, slip=0.08)
+    sim = SimulatedRobot(config, Row(()), Blind(), None, world, seed)
+    wheels, both = Odometer(DRIVE, OdometryConfig(), 0.001), BaseOrientation(RobotModel())
+    odometer = Odometer(DRIVE, OdometryConfig(), 0.001, 0, both)
+    start, off, turned = np.linalg.inv(sim.true_base_rotation()), [], []
+    for tick in range(9000):
+        ramp = np.clip(min(tick - 1000, 8000 - tick) / 500, 0.0, 1.0)
+        sway = 0.4 * math.sin(2.0 * math.pi * tick / 2000) * ramp
+        sim.write(setpoint(0.25 * ramp, 0.0, (sway, 0.0, 0.0, sway, 0.0, 0.0, sway)))
+        if tick % 10 == 0:
+            measured = sim.read()
+            odometer.follow(measured, tick * 0.001)
+            wheels.follow(measured, tick * 0.001)
+            true, _ = attitude_of(start @ sim.true_base_rotation(), 0.0)
+            told = odometer.attitude
+            assert told is not None
+            off.append((told.roll - true.roll, told.pitch - true.pitch, true.roll, true.pitch))
+            heading = sim.true_base().pose[2]
+            turned.append((odometer.pose.phi - heading, wheels.pose.phi - heading))
+    gyroscope, by_wheels = np.abs(turned).max(axis=0)
+    assert gyroscope < 0.008 < by_wheels
+    roll, pitch, true_roll, true_pitch = np.sqrt(np.mean(np.square(off), axis=0))
+    assert max(roll, pitch) < 0.005 < 0.5 * max(true_roll, true_pitch)
 
 
 def test_the_arm_holds_against_gravity_and_the_base_stays() -> None:

@@ -7,7 +7,7 @@ from msgspec.structs import replace
 
 from perception.segmentation.frame import decode_frame
 from perception.tracking.camera_rays import CameraRays
-from rolling_panda.messages.types import PlanarPose
+from rolling_panda.messages.types import BaseAttitude, PlanarPose
 from rolling_panda.model.robot import RobotModel
 from tests.perception.test_frame import good_frame
 
@@ -15,10 +15,10 @@ MODEL = RobotModel()
 SHARE = st.floats(0.0, 1.0)
 
 
-@given(u=SHARE, v=SHARE, x=st.floats(-5.0, 5.0), phi=st.floats(-3.0, 3.0))
-def test_what_is_on_the_line_is_seen_at_the_place_that_was_clicked(u, v, x, phi):
+@given(u=SHARE, v=SHARE, x=st.floats(-5.0, 5.0), phi=st.floats(-3.0, 3.0), roll=st.floats(-0.1, 0.1))
+def test_what_is_on_the_line_is_seen_at_the_place_that_was_clicked(u, v, x, phi, roll):
     rays = CameraRays()
-    frame = good_frame(base=PlanarPose(x, 0.0, phi))
+    frame = replace(good_frame(base=PlanarPose(x, 0.0, phi)), attitude=BaseAttitude(0.02, roll, -0.03))
     rays.add(frame)
     ray = rays.ray(1, u, v, MODEL)
     view = decode_frame(frame, MODEL)

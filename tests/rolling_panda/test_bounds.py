@@ -48,7 +48,7 @@ PROMISED = {
 HARMLESS = {
     "bridge": "arm_lag_s wheel_lag_s close_s opening blade_half_length blade_half_thickness largest_diameter "
     "camera_moving_hz camera_resting_hz frame_time_offset odometry.delay_s odometry.position_noise "
-    "odometry.heading_noise odometry.linear_noise odometry.angular_noise",
+    "odometry.heading_noise odometry.linear_noise odometry.angular_noise inertial",
     "real": "arm.load_mass arm.load_inertia camera.enabled camera.width camera.height camera.rate_hz",
     "robot": "rho",
     "controller": "work.row_heading work.search_steps work.servo motion.blend motion.base_lag_s motion.arm_lag_s "

@@ -7,6 +7,7 @@ from contextlib import ExitStack
 import numpy as np
 
 from bridge.config import BridgeConfig, OdometryConfig
+from bridge.core.attitude import GRAVITY, BaseOrientation, Inertial
 from bridge.core.bridge import TICK_S, BridgeCore
 from bridge.core.odometer import Odometer
 from bridge.core.picture import Picture
@@ -15,8 +16,10 @@ from bridge.real.cutter import Cutter
 from bridge.real.mp500 import Mp500
 from bridge.real.panda import Panda
 from bridge.real.robot import RealRobot
+from bridge.real.software_realsense import SoftwareMotion
 from rolling_panda.config import TransportConfig
 from rolling_panda.model.differential_drive import Array
+from rolling_panda.model.robot import RobotModel
 from rolling_panda.transport.zenoh import ForeignWire
 from tests.support.bridge_rig import MODEL, PICTURE
 from tests.support.processes.device_process import DeviceProcess
@@ -24,20 +27,30 @@ from tests.support.processes.local_router import local_router
 
 ADDRESS = f"127.0.{os.getpid() % 250 + 1}.8"
 SERVICE = "cutter/close"
+#: Time between two samples of the inertial sensors (s).
+_SAMPLE_S = 0.005
 
 
 class OnePicture:
-    """A camera whose pictures nobody looks at."""
+    """A camera whose pictures nobody looks at, upright and at rest by its inertial sensors."""
 
     def __init__(self) -> None:
         self._ready: Picture | None = None
+        self._motion = SoftwareMotion()
+        self._felt_at = 0.0
+
+    def inertial(self) -> Inertial | None:
+        if (now := time.monotonic()) - self._felt_at > _SAMPLE_S:
+            self._felt_at = now
+            self._motion.feel(Inertial(np.zeros(3), np.array([0.0, -GRAVITY, 0.0])))
+        return self._motion.newest()
 
     def capture(self, expose: bool) -> Picture | None:
         ready, self._ready = self._ready, PICTURE if expose else None
         return ready
 
     def close(self) -> None:
-        pass
+        self._motion.close()
 
 
 class Devices:
@@ -68,7 +81,7 @@ class RealPlant(Devices):
         """A bridge on these devices, once they are there; the one before lets go."""
         if self.robot is not None:
             self.robot.close()
-        config = BridgeConfig()
+        config = BridgeConfig(inertial=True)
         acceleration = config.wheel_acceleration
         wire = TransportConfig(connect=(self.endpoint,), plain_wire=True)
         base = Mp500(ForeignWire(wire), MODEL.drive, acceleration, BaseConfig())
@@ -79,7 +92,8 @@ class RealPlant(Devices):
         while self.robot.read().fault or blades.read().state != "open":
             assert time.monotonic() < end, self.robot.read().fault
             time.sleep(0.02)
-        return BridgeCore(self.robot, config, MODEL.limits, Odometer(MODEL.drive, OdometryConfig(), TICK_S), "real")
+        odometer = Odometer(MODEL.drive, OdometryConfig(), TICK_S, 0, BaseOrientation(RobotModel()))
+        return BridgeCore(self.robot, config, MODEL.limits, odometer, "real")
 
     def velocity(self) -> Array:
         return np.array([*self.base.tell()["wheels"], *self.arm.tell()["dq"]])

@@ -46,7 +46,8 @@ def test_an_accepted_point_is_cut_where_it_was_accepted_by_libfranka_ros_and_lib
         "[perception]\nframe_timeout_s = 20.0"
     )
     small = "[vineyard]\nvines = 1\nrows_behind = 0\n\n"
-    config.write_text(text.replace("[perception]", small + patient))
+    felt = text.replace("[bridge]\n", "[bridge]\ninertial = true\n")
+    config.write_text(felt.replace("[perception]", small + patient))
     demo = Demo(free_port(), 0, config, "--bridge", "real", "--fakes", "--trace", str(record))
     try:
         assert demo.state()["bridge"]["kind"] == "fakes"

@@ -19,6 +19,7 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
+from bridge.sim.robot.inertial import ACCELEROMETER, GYROSCOPE
 from bridge.sim.vineyard.row import Row
 from bridge.sim.world.errors import Errors
 from rolling_panda.errors import ModelError
@@ -80,13 +81,14 @@ class Plant:
     ground: tuple[tuple[int, int], ...] = ()
 
 
-def build_plant(row: Row, errors: Errors | None = None, uneven: bool = False) -> Plant:
+def build_plant(row: Row, errors: Errors | None = None, uneven: bool = False, inertial: bool = False) -> Plant:
     """Compile the robot at odom's origin beside the solid rods of `row`.
 
     Args:
         row: The row.
         errors: How this robot differs from the program's model of it; None for not at all.
         uneven: The ground has a plane of its own under each wheel, which `Plant.ground` names.
+        inertial: The camera has a gyroscope and an accelerometer.
 
     Raises:
         ModelError: MuJoCo refuses the model.
@@ -118,6 +120,10 @@ def build_plant(row: Row, errors: Errors | None = None, uneven: bool = False) ->
     _exclude_neighbours(spec)
     for frame in ("tool", "camera"):
         _add_site(bodies, robot, frame)
+    if inertial:
+        kinds = mujoco.mjtSensor
+        for name, kind in ((GYROSCOPE, kinds.mjSENS_GYRO), (ACCELEROMETER, kinds.mjSENS_ACCELEROMETER)):
+            spec.add_sensor(name=name, type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname="camera")
     try:
         model = spec.compile()
     except ValueError as error:

@@ -22,6 +22,7 @@ from bridge.core.interface import Measurement, Setpoint
 from bridge.core.picture import Picture
 from bridge.sim.camera.render_process import CameraRenderer
 from bridge.sim.robot.cutter import CutResult, Cutter, close_blades, wood_in_plane
+from bridge.sim.robot.inertial import InertialSensors
 from bridge.sim.robot.model import STEP_S, build_plant
 from bridge.sim.robot.touch import ExternalTorque, touching_spheres
 from bridge.sim.robot.trace import CUTTER, TraceWriter
@@ -132,7 +133,8 @@ class SimulatedRobot:
         errors, uneven = draw_errors(world, seed), world.bumps > 0.0 or world.slope_across > 0.0
         self._offset = errors.joint_offset
         self._start_arm = np.array(config.start_arm) - self._offset
-        self._plant = build_plant(row, errors, uneven)
+        self._plant = build_plant(row, errors, uneven, config.inertial)
+        self._inertial = InertialSensors(world.inertial_errors, errors.hand_eye, seed) if config.inertial else None
         self._levelled: Array | None = None
         self._planes, self._wheels = np.array(self._plant.ground, int).reshape(-1, 2).T
         self._ground = Ground(world, float(errors.slope[1]), seed)
@@ -184,6 +186,7 @@ class SimulatedRobot:
             cutter.detail,
             emergency=self.emergency,
             external_torque=self._felt.value.copy(),
+            inertial=None if self._inertial is None else self._inertial.sample(data),
         )
 
     def write(self, setpoint: Setpoint) -> None:

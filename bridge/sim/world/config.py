@@ -40,6 +40,7 @@ class WorldConfig(Struct, frozen=True, forbid_unknown_fields=True):
         slope_along: Slope of the ground along the row, up to this: gravity leans.
         slope_across: Slope of the ground across the row, up to this: the base rolls towards or away from it.
         bumps: Height of bumps above the mean ground, from 0.6 to 3 m long.
+        inertial_errors: Bias and noise of the camera's gyroscope and accelerometer, as multiples of the usual ones.
         sway: Amplitude of canes in the wind, 0.3 m above their base and twice this at the tip, at 0.5 to 2 Hz.
         depth_lost: Fraction of thin wood without depth in each frame, in patches: low sun on active stereo.
         sunlight: Light of a low sun on a surface that faces it, as a multiple of the sky's; it casts hard shadows.
@@ -70,6 +71,7 @@ class WorldConfig(Struct, frozen=True, forbid_unknown_fields=True):
     slope_along: Slope = 0.0
     slope_across: Slope = 0.0
     bumps: Shift = 0.0
+    inertial_errors: Annotated[float, Meta(ge=0.0, le=10.0)] = 0.0
     sway: Annotated[float, Meta(ge=0.0, le=0.1)] = 0.0
     depth_lost: Share = 0.0
     sunlight: Annotated[float, Meta(ge=0.0, le=20.0)] = 0.0
@@ -104,6 +106,7 @@ PRESETS: dict[str, WorldConfig] = {
         slope_along=math.radians(3.0),
         slope_across=math.radians(2.0),
         bumps=0.010,
+        inertial_errors=1.0,
         sway=0.005,
         depth_lost=0.2,
         sunlight=2.0,
@@ -133,6 +136,7 @@ PRESETS: dict[str, WorldConfig] = {
         slope_along=math.radians(6.0),
         slope_across=math.radians(4.0),
         bumps=0.025,
+        inertial_errors=2.0,
         sway=0.020,
         depth_lost=0.5,
         sunlight=5.0,
