@@ -171,7 +171,7 @@ class Perception:
         view = decode_frame(frame, self._model)
         self._stamp = view.stamp
         self.camera_rays.add(frame)
-        self.row_frame.predict(_base(frame), view.stamp, frame.attitude is not None)
+        self.row_frame.predict(_base(frame), view.stamp, _inertial(frame))
         self.withdrawn = ()
         if self.camera.follow(frame.joint_offsets):
             self._forget()
@@ -268,7 +268,7 @@ class Perception:
         if point is None or not self.camera.fits(frame.joint_offsets):
             return failed_check(frame, reasons.point_unknown_to_perception())
         view = decode_frame(frame, self._model)
-        self.row_frame.predict(_base(frame), view.stamp, frame.attitude is not None)
+        self.row_frame.predict(_base(frame), view.stamp, _inertial(frame))
         try:
             if self.row_frame.uncertain:
                 self._locate(view)
@@ -536,6 +536,11 @@ class Perception:
 
     def _no_survey(self) -> m.Reason:
         return reasons.no_cordon_in_range(self._config.survey_min_depth, self._config.survey_max_depth)
+
+
+def _inertial(frame: CameraFrame) -> bool:
+    """Whether inertial sensors have corrected the odometry."""
+    return frame.attitude is not None and frame.attitude.measured
 
 
 def _base(frame: CameraFrame) -> Array:

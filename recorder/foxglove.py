@@ -40,7 +40,8 @@ def _time(stamp_ns: int) -> dict[str, int]:
 
 
 def _base_transform(message: m.Odometry, stamp_ns: int) -> dict[str, Any]:
-    return _transform("odom", "base_link", pose_message(T_odom_base(message.pose, message.attitude)), stamp_ns)
+    # Level, as the pose of the tool is told.
+    return _transform("odom", "base_link", pose_message(T_odom_base(message.pose)), stamp_ns)
 
 
 def _map_transform(message: Localisation, stamp_ns: int) -> dict[str, Any]:

@@ -225,7 +225,9 @@ def _blocked(
         return {}
     model, robot = RobotModel(), loop.bridge.robot
     assert isinstance(robot, SimulatedRobot)
-    frame = MapFrame() if localisation is None else MapFrame().after(localisation.message)
+    frame, odometry = MapFrame(), loop.inbox.newest(m.Odometry)
+    frame = frame if localisation is None else frame.after(localisation.message)
+    frame = frame if odometry is None else frame.standing(odometry.message)
     T_map_tool = frame.pose_in_map(model.pose(loop.configuration(), model.tool_id))
     T_world_map = robot.true_tool() @ T_map_tool.inverse().homogeneous
     kinds = {point.point_id: point.kind for point in shown.message.points}

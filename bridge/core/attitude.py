@@ -8,6 +8,7 @@ and pitch from drifting; nothing keeps the heading, which drifts far less than t
 Odom is level with the base where the robot was switched on, so that up is a direction that is measured there.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,15 +20,19 @@ from rolling_panda.model.robot import RobotModel
 GRAVITY = 9.81
 #: A wheel or joint stands while it has not turned faster than this (rad/s) for this time (s).
 _STANDS, _STANDS_S = 0.005, 0.25
-#: Time constants (s): of the bias while the robot stands, and of roll and pitch towards gravity, standing and moving.
-_BIAS_S, _GRAVITY_S, _MOVING_GRAVITY_S = 0.5, 2.0, 20.0
+#: The bias is a mean over this time of standing at most, and known after this time (s).
+_BIAS_S, _KNOWN_S = 2.0, 0.25
+#: Time constants of roll and pitch towards gravity, standing and moving (s).
+_GRAVITY_S, _MOVING_GRAVITY_S = 2.0, 20.0
 #: A camera that accelerates more than this does not tell where up is (m/s²).
 _SHAKEN = 0.4
 #: Longest time between two samples that is integrated (s); what happens in a longer one is unknown.
 _GAP_S = 0.1
+#: Without a sample for this time the orientation is no longer measured (s).
+_LOST_S = 0.2
 #: SD of the camera's rotation on the hand (rad); the arm's turn (rad) that tells of it, and its error: of the gyroscope
-#: (rad), and of its scale, as a share of the turn.
-_MOUNT, _TELLS, _NOISE, _SCALE = 0.009, 0.2, 0.001, 0.005
+#: (rad), and of its scale, as a share of the turn. What is farther off than so many SD is no error of the mount.
+_MOUNT, _TELLS, _NOISE, _SCALE, _PLAUSIBLE = 0.009, 0.2, 0.001, 0.005, 4.0
 
 
 @dataclass(frozen=True)
@@ -35,17 +40,14 @@ class Inertial:
     """A sample of the camera's inertial sensors, in its optical frame: x right, y down, z forward.
 
     Attributes:
+        at: On the sensors' own clock (s).
         rate: Angular velocity (3, rad/s).
         force: Specific force (3, m/s²): at rest, `GRAVITY` upwards.
     """
 
+    at: float
     rate: Array
     force: Array
-
-    @property
-    def valid(self) -> bool:
-        """Whether every number is one: another would spoil all that comes after it."""
-        return bool(np.isfinite(self.rate).all() and np.isfinite(self.force).all())
 
 
 class BaseOrientation:
@@ -60,11 +62,18 @@ class BaseOrientation:
         self._model = model
         #: R_odom_base (3×3).
         self.R: Array = np.eye(3)
+        #: Whether it is measured now; else roll and pitch are what they were.
+        self.measured = False
         self._q = np.zeros(3 + NXI)
-        self._hand: Array | None = None
-        self._at = self._rolled_at = self._moved_at = 0.0
-        self._bias: Array | None = None
-        self._rate: Array = np.zeros(3)
+        self._last: tuple[Inertial, Array] | None = None
+        self._measured_at = -math.inf
+        self._rolled_at: float | None = None
+        #: Turn by the wheels since the last sample (rad).
+        self._turned = 0.0
+        self._moved_at = 0.0
+        self._bias: Array = np.zeros(3)
+        #: How long the bias was averaged (s).
+        self._stood = 0.0
         #: Up in odom: the sum of samples before the first motion.
         self._up: Array = np.zeros(3)
         self._has_moved = False
@@ -83,31 +92,50 @@ class BaseOrientation:
         Returns:
             R_odom_base (3×3).
         """
+        speed = np.abs(velocity)
+        if self._rolled_at is None:
+            self._rolled_at = self._moved_at = now
+        if not speed.max() <= _STANDS:
+            self._moved_at, self._has_moved = now, self._has_moved or self._stood >= _KNOWN_S
+        if not speed[:2].max() <= _STANDS:
+            self._rolled_at = now
+        self._turned += turned if math.isfinite(turned) else 0.0
+        if sample is None or not all(np.isfinite(each).all() for each in (sample.rate, sample.force, position)):
+            self._last = None
+            self._mount.leave()
+            self._by_wheels()
+        elif self._last is None or sample.at != self._last[0].at:
+            self._integrate(sample, position, now)
+            self._turned = 0.0
+        self.measured = now - self._measured_at < _LOST_S
+        return self.R
+
+    def _by_wheels(self) -> None:
+        self.R = self.R @ pin.exp3(np.array([0.0, 0.0, self._turned]))
+        self._turned = 0.0
+
+    def _integrate(self, sample: Inertial, position: Array, now: float) -> None:
         self._q[3:] = position
         hand: Array = self._model.pose(self._q, self._model.camera_id).rotation.copy()
-        before, passed, rate = self._hand, now - self._at, self._rate
-        self._hand, self._at = hand, now
-        speed = np.abs(velocity)
-        if speed.max() > _STANDS:
-            self._moved_at, self._has_moved = now, self._has_moved or self._bias is not None
-        if speed[:2].max() > _STANDS:
-            self._rolled_at = now
-        stands, parked = (now - last >= _STANDS_S for last in (self._moved_at, self._rolled_at))
-        by_wheels = self.R @ pin.exp3(np.array([0.0, 0.0, turned]))
-        if sample is None or not sample.valid or before is None or not 0.0 < passed < _GAP_S:
+        last, self._last = self._last, (sample, hand)
+        passed = math.inf if last is None else sample.at - last[0].at
+        if last is None or not 0.0 < passed < _GAP_S:
             self._mount.leave()
-            self.R = by_wheels
-            return self.R
-        self._rate = sample.rate
+            self._by_wheels()
+            return
+        assert self._rolled_at is not None
+        stands, parked = now - self._moved_at >= _STANDS_S, now - self._rolled_at >= _STANDS_S
         if stands:
             self._learn_bias(sample.rate, passed)
-        if self._bias is None:
-            self.R = by_wheels
-            return self.R
-        turning = pin.exp3((0.5 * (rate + sample.rate) - self._bias) * passed)
+        if self._stood < _KNOWN_S:
+            self._by_wheels()
+            return
+        self._measured_at = now
+        before = last[1]
+        turning = pin.exp3((0.5 * (last[0].rate + sample.rate) - self._bias) * passed)
         if parked:
             # Slower than the gyroscope's noise it may still creep.
-            self.R = by_wheels
+            self._by_wheels()
             self._mount.follow(before, turning, hand, stands)
         else:
             self._mount.leave()
@@ -118,13 +146,10 @@ class BaseOrientation:
             self._up = self._up + self.R @ force
         elif stands or not parked:
             self._to_gravity(force, passed / (_GRAVITY_S if stands else _MOVING_GRAVITY_S))
-        return self.R
 
     def _learn_bias(self, rate: Array, passed: float) -> None:
-        if self._bias is None:
-            self._bias = rate.copy()
-        else:
-            self._bias = self._bias + min(passed / _BIAS_S, 1.0) * (rate - self._bias)
+        self._stood += passed
+        self._bias = self._bias + passed / min(self._stood, _BIAS_S) * (rate - self._bias)
 
     def _to_gravity(self, force: Array, share: float) -> None:
         """Turn the base about a level axis, so that up, as it feels it, comes nearer to where it was."""
@@ -141,6 +166,7 @@ class _MountEstimate:
         """As the model has it."""
         #: Rotation of the true camera on that of the model (3×3).
         self.R: Array = np.eye(3)
+        self._turn: Array = np.zeros(3)
         self._information: Array = np.eye(3) / _MOUNT**2
         self._vector: Array = np.zeros(3)
         self._start: Array | None = None
@@ -160,8 +186,13 @@ class _MountEstimate:
             return
         # With the camera turned by a small ε, what seems to be left of the base's turn is (hand - start) ε.
         off, left = hand - self._start, pin.log3(self._start @ self._turned @ hand.T)
-        weight = 1.0 / (_NOISE**2 + (_SCALE * angle) ** 2)
-        self._information = self._information + weight * off.T @ off
-        self._vector = self._vector + weight * off.T @ left
-        self.R = pin.exp3(np.linalg.solve(self._information, self._vector))
         self._start = None
+        variance = _NOISE**2 + (_SCALE * angle) ** 2
+        surprise = float(np.linalg.norm(left - off @ self._turn))
+        # Someone leans on the base, or it sinks in.
+        if surprise > _PLAUSIBLE * math.sqrt(variance + (_MOUNT * float(np.linalg.norm(off, 2))) ** 2):
+            return
+        self._information = self._information + off.T @ off / variance
+        self._vector = self._vector + off.T @ left / variance
+        self._turn = np.asarray(np.linalg.solve(self._information, self._vector), np.float64)
+        self.R = pin.exp3(self._turn)

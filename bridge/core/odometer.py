@@ -4,6 +4,7 @@ import math
 from collections import deque
 
 import numpy as np
+from msgspec.structs import replace
 
 from bridge.config import OdometryConfig
 from bridge.core.attitude import BaseOrientation
@@ -73,7 +74,8 @@ class Odometer:
             return
         way, turned = self._drive.twist(left, right)
         R = self._orientation.update(measured.inertial, measured.position, measured.velocity, turned, now)
-        self._attitude, heading = attitude_of(R, self._attitude.height + float(R[2, 0]) * way)
+        attitude, heading = attitude_of(R, self._attitude.height + float(R[2, 0]) * way)
+        self._attitude = replace(attitude, measured=self._orientation.measured)
         # The forward axis of a base that climbs is shorter on the plane.
         level = way * float(np.hypot(R[0, 0], R[1, 0]))
         turned = math.remainder(heading - float(self._pose[2]), math.tau)

@@ -108,6 +108,8 @@ def open_devices(
         raise InputError(
             f"{real.arm.address} may be a real arm: with --fakes [real.arm] address has to begin with {_LOOPBACK}"
         )
+    if config.inertial and not real.camera.enabled:
+        raise InputError(f"{config_path}: [bridge] inertial = true needs the camera: set [real.camera] enabled = true")
     with ExitStack() as opened:
         camera = _camera(wire, real.camera, config.inertial, fakes) if real.camera.enabled else None
         if camera is not None:

@@ -33,11 +33,11 @@ def unpack(data: bytes) -> Exposure:
 
 
 def pack_inertial(sample: Inertial) -> bytes:
-    """A sample on the wire: angular velocity and specific force, 6 numbers."""
-    return np.concatenate([sample.rate, sample.force]).astype("<f8").tobytes()
+    """A sample on the wire: time, angular velocity and specific force, 7 numbers."""
+    return np.concatenate([[sample.at], sample.rate, sample.force]).astype("<f8").tobytes()
 
 
 def unpack_inertial(data: bytes) -> Inertial:
     """The sample that `pack_inertial` has packed."""
-    values = np.frombuffer(data, "<f8", 6)
-    return Inertial(values[:3].copy(), values[3:].copy())
+    values = np.frombuffer(data, "<f8", 7)
+    return Inertial(float(values[0]), values[1:4].copy(), values[4:].copy())

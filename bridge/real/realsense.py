@@ -44,19 +44,24 @@ class MotionSamples:
 
     def __init__(self) -> None:
         """None yet."""
-        self._newest: dict[str, tuple[float, Array]] = {}
+        self._newest: dict[str, tuple[float, float, Array]] = {}
 
     def __call__(self, frame: Any) -> None:
         """Take in a frame."""
         if not frame.is_motion_frame():
             return
         told = frame.as_motion_frame().get_motion_data()
-        self._newest[frame.get_profile().stream_type().name] = time.monotonic(), np.array([told.x, told.y, told.z])
+        values, at = np.array([told.x, told.y, told.z]), 1e-3 * float(frame.get_timestamp())
+        self._newest[frame.get_profile().stream_type().name] = time.monotonic(), at, values
 
     def newest(self) -> Inertial | None:
         """As of `Motion`."""
-        (at, rate), (then, force) = (self._newest.get(name, (-1.0, np.zeros(3))) for name in ("gyro", "accel"))
-        return Inertial(rate, force) if time.monotonic() - min(at, then) < _FRESH_S else None
+        gyroscope, accelerometer = self._newest.get("gyro"), self._newest.get("accel")
+        if gyroscope is None or accelerometer is None:
+            return None
+        if time.monotonic() - min(gyroscope[0], accelerometer[0]) > _FRESH_S:
+            return None
+        return Inertial(gyroscope[1], gyroscope[2], accelerometer[2])
 
 
 class RealSense:

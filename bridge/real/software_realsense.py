@@ -132,7 +132,7 @@ class SoftwareMotion(MotionSamples):
             frame, data = rs.software_motion_frame(), rs.vector()
             data.x, data.y, data.z = values.tolist()
             frame.data, frame.profile = data, profile.as_motion_stream_profile()
-            frame.timestamp, frame.frame_number = 1e3 * time.time(), self._number
+            frame.timestamp, frame.frame_number = 1e3 * sample.at, self._number
             frame.domain = rs.timestamp_domain.system_time
             self._sensor.on_motion_frame(frame)
 

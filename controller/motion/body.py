@@ -164,6 +164,8 @@ class Body:
         #: Obstacles in odom.
         self.obstacles: Received[Obstacles] | None = None
         self._told: tuple[Received[Obstacles] | None, MapFrame] = None, self.frame
+        #: The same for the obstacles, which are not converted for less than `_OBSTACLES_MOVED`.
+        self._around = MapFrame()
 
     def update(self, inbox: Inbox) -> None:
         """Update state and obstacles from what has arrived."""
@@ -211,16 +213,20 @@ class Body:
         told, around, odometry = inbox.newest(Localisation), inbox.newest(Obstacles), inbox.newest(Odometry)
         if told is not None:
             self.frame = self.frame.after(told.message)
+            self._around = self._around.after(told.message)
         if odometry is not None:
             self.frame = self.frame.standing(odometry.message)
-        if self._told != (around, self.frame):
-            self._told, self.obstacles = (around, self.frame), around
-            if around is not None and self.frame.T_map_level is not None:
-                capsules = self.frame.capsules_in_odom(around.message.capsules)
+            self._around = self._around.standing(odometry.message, _OBSTACLES_MOVED)
+        if self._told != (around, self._around):
+            self._told, self.obstacles = (around, self._around), around
+            if around is not None and self._around.T_map_level is not None:
+                capsules = self._around.capsules_in_odom(around.message.capsules)
                 in_odom = Obstacles(header=m.Header(around.message.header.stamp, "odom"), capsules=capsules)
                 self.obstacles = Received(in_odom, around.at)
 
 
+#: Obstacles move with uneven ground in steps of this (m): to convert hundreds takes a part of a control period.
+_OBSTACLES_MOVED = 0.003
 #: Radius of a known cane of which only the course is told (m).
 _CANE_RADIUS = 0.005
 

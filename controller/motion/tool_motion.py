@@ -204,7 +204,7 @@ def _add(
         R[i, 2] += first * once[2] + second * (once[0] * b - once[1] * a)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Correction:
     """A straight shift of the rest of a motion.
 

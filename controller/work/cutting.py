@@ -211,7 +211,7 @@ class Parts:
         as_shown: Whether the work may take no other way than the one that was shown.
         ending: Reason to begin no further cut; None without one.
         cut_point: Point of the last cut; empty before the first.
-        cut_at: Position of the tool at the last cut (3, m, odom).
+        cut_at: Position of the tool at the last cut (3, m, odom itself: the base may stand otherwise when it is seen).
         gave_way: Times that it gave way to canes since the last cut.
     """
 
@@ -238,8 +238,9 @@ class Parts:
 
         During the retreat, without a stop: one picture is enough to see that the wood is gone.
         """
-        if math.dist(robot.kinematics.T_odom_tool.translation, self.cut_at) > self.config.work.close_up_from:
-            self.post_cut_check.request_close_up(self.cut_point, self.cut_at, now)
+        cut_at = robot.frame.levelled(self.cut_at)
+        if math.dist(robot.kinematics.T_odom_tool.translation, cut_at) > self.config.work.close_up_from:
+            self.post_cut_check.request_close_up(self.cut_point, cut_at, now)
 
     def refine(self, point_id: str, motion: ToolMotion, frame: MapFrame) -> None:
         """Correct a motion to the newest, more accurate position of its point."""
@@ -578,7 +579,8 @@ class MovingStage(TaskStage):
     def _retreat(self, robot: Measured) -> "Retreat":
         """Straight out of the canes, and on to the next cut where one is found."""
         parts, following = self._parts, self._parts.next_cut
-        parts.cut_at, parts.cut_point = robot.kinematics.T_odom_tool.translation.copy(), self.point_id
+        tool = robot.kinematics.T_odom_tool.translation
+        parts.cut_at, parts.cut_point = robot.frame.tilted(tool).copy(), self.point_id
         back = parts.segments.out(self._task.plan, robot.q)
         ticket, found = parts.queue.get(self.point_id), following.found
         unsure = ticket is not None and ticket.state == "UNKNOWN"
@@ -738,13 +740,14 @@ class Advance(MovingStage):
 
     def _follow_ground(self, robot: Measured) -> None:
         """Keep the goal in its place in odom while the base rolls over uneven ground."""
-        before, now = self._task.frame.T_odom_level, robot.frame.T_odom_level
-        if now is before:
+        before, now = self._task.frame, robot.frame
+        if now.T_odom_level is before.T_odom_level:
             return
-        self._task = replace(self._task, frame=replace(self._task.frame, T_odom_level=now))
+        self._task = replace(self._task, frame=replace(before, T_odom_level=now.T_odom_level))
         goal = self._way.motion.goal.translation
-        place = goal if before is None else before.act(goal)
-        self._way.motion.shift((place if now is None else now.actInv(place)) - goal)
+        moved = now.levelled(before.tilted(goal)) - goal
+        self._way.motion.shift(moved)
+        self._parts.servo.carry(moved)
 
     def step(self, robot: Measured, now: float) -> Step:
         """One period."""

@@ -19,6 +19,7 @@ from controller.config import WorkConfig
 from controller.motion.follower import Measured
 from controller.motion.tool_motion import ToolMotion
 from rolling_panda.messages.perception import CutSight
+from rolling_panda.model.differential_drive import Array
 
 #: SD of where the close-up has a cane, sway included (m).
 _BEFORE = 0.003
@@ -61,6 +62,10 @@ class CutServo:
         self._aside, self._variance, self._made = np.zeros(2), np.full(2, _BEFORE**2), np.zeros(2)
         self._asked: dict[int, _Asked] = {}
         self._away, self._speed, self._next = 0.0, 0.0, -math.inf
+
+    def carry(self, by: Array) -> None:
+        """The cut is elsewhere in odom (by, 3, m), as the base rolls over uneven ground."""
+        self._goal = self._goal + by
 
     def end(self) -> None:
         """Follow nothing."""

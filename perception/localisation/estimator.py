@@ -29,8 +29,9 @@ X, Y, Z, RX, RY, RZ = range(6)
 _SLIP, _CORRELATED, _HALF_TRACK = 0.035, 0.5, 0.28
 #: Height (m) and tilt (rad) of the base on uneven ground (SD), and the way over which they change (m).
 _HEIGHT, _TILT, _UNEVEN = 0.008, 0.015, 0.4
-#: The same where inertial sensors tell how the base stands, and of its heading over a metre (rad).
-_MEASURED_HEIGHT, _MEASURED_TILT, _GYROSCOPE = 0.005, 0.004, 0.004
+#: Where inertial sensors tell how the base stands: by how much height (m), tilt and heading (rad) are off after a metre
+#: (SD), growing with the square root of the way.
+_MEASURED_HEIGHT, _MEASURED_TILT, _GYROSCOPE = 0.008, 0.004, 0.004
 #: Standard deviation of a sample across its line by kind (m): depth, centre line, wind.
 _NOISE = {CANE: 0.004, UPRIGHT: 0.005, ALONG: 0.005, WIRES: 0.008}
 #: What the samples of one frame have in common: tilt while driving, wind, depth (m and rad, SD).
@@ -67,7 +68,7 @@ _FASTEST, _TURNS, _JUMP = 2.0, 3.0, 0.3
 #: A frame that is older than the last is late; one that is older by more than this is of a clock that began anew (s).
 _ORDER, _LATE = 1e-6, 1.0
 #: Added to the covariance of a robot that is lost (m², rad²).
-_DOUBT = np.diag(np.array([0.1, 0.05, 0.01, 0.01, 0.01, 0.05]) ** 2)
+_DOUBT = np.diag(np.array([0.1, 0.05, 0.02, 0.03, 0.03, 0.05]) ** 2)
 #: Time from the joint state of a frame to its exposure, about (s).
 _DELAY = 0.02
 #: Standard deviation along the row, at the row, from which on the robot is lost (m).
@@ -258,7 +259,8 @@ class RowLocaliser:
         self._way += way
         F = np.eye(6)
         F[X, RZ], F[Y, RZ] = -step[1], step[0]
-        stays = np.exp(-rolled / _UNEVEN)
+        # What inertial sensors leave does not follow the ground: it grows with the way.
+        stays = 1.0 if inertial else float(np.exp(-rolled / _UNEVEN))
         F[[Z, RX, RY], [Z, RX, RY]] = stays
         P = F @ self._covariance @ F.T
         before = self._since_fix
@@ -268,9 +270,12 @@ class RowLocaliser:
         along = np.array([np.cos(heading), np.sin(heading)])
         P[:2, :2] += grown / 2 * np.outer(along, along) + 0.02 * grown * np.eye(2)
         P[RZ, RZ] += _GYROSCOPE**2 * rolled if inertial else grown / (2 * _HALF_TRACK**2)
-        height, tilt = (_MEASURED_HEIGHT, _MEASURED_TILT) if inertial else (_HEIGHT, _TILT)
-        for index, spread in ((Z, height), (RX, tilt), (RY, tilt)):
-            P[index, index] += (1.0 - stays**2) * spread**2
+        for index, spread, measured in (
+            (Z, _HEIGHT, _MEASURED_HEIGHT),
+            (RX, _TILT, _MEASURED_TILT),
+            (RY, _TILT, _MEASURED_TILT),
+        ):
+            P[index, index] += measured**2 * rolled if inertial else (1.0 - stays**2) * spread**2
         self._covariance = P
         self._pose[[X, Y]] += step
         self._pose[RZ] += turned

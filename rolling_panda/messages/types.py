@@ -107,11 +107,13 @@ class BaseAttitude(Struct, frozen=True, forbid_unknown_fields=True):
         height: Above the plane (m).
         roll: About the x axis, left side up (rad).
         pitch: About the y axis, nose down (rad).
+        measured: Whether the sensors tell it now; else it is what it was, and the heading is that of the wheels.
     """
 
     height: Metre = 0.0
     roll: Tilt = 0.0
     pitch: Tilt = 0.0
+    measured: bool = True
 
 
 class Heartbeat(Message, frozen=True, kw_only=True):

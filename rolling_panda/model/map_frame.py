@@ -23,7 +23,7 @@ from rolling_panda.model.robot import RobotModel, placement
 from rolling_panda.model.wire_values import vector3
 
 _ORIGIN = Pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
-#: The base stands as before where what it carries, within so far of its place, has moved less than this (m).
+#: The base carries what is within so far of its place. It stands as before where that has moved less than this (m).
 _REACH, _MOVED = 1.2, 0.0007
 
 _Seen = TypeVar("_Seen", CloseUpResult | None, CutSight | None)
@@ -60,26 +60,36 @@ class MapFrame:
         except ModelError:
             return self
 
-    def standing(self, odometry: Odometry) -> "MapFrame":
-        """With the base as it stands now: the same object while that has hardly changed."""
+    def standing(self, odometry: Odometry, least: float = _MOVED) -> "MapFrame":
+        """With the base as it stands now: the same object while what it carries has moved less than `least` (m)."""
         now, before = T_odom_level(odometry.pose, odometry.attitude), self.T_odom_level
         if now is None or before is None:
             return self if now is before else MapFrame(self.T_map_odom, self.pose, now)
         change, base = before.actInv(now), np.array([odometry.pose.x, odometry.pose.y, 0.0])
         turned = float(np.linalg.norm(pin.log3(change.rotation)))
         moved = float(np.linalg.norm(change.act(base) - base)) + _REACH * turned
-        return self if moved < _MOVED else MapFrame(self.T_map_odom, self.pose, now)
+        return self if moved < least else MapFrame(self.T_map_odom, self.pose, now)
 
     def camera(self, frame: CameraFrame, model: RobotModel) -> Any:
         """T_map_camera (pin.SE3) when a frame was taken; the model's `data` is overwritten."""
         T_odom_camera = camera_in_odom(frame, model)
         return T_odom_camera if self.T_map_odom is None else self.T_map_odom * T_odom_camera
 
+    def tilted(self, position: Array) -> Array:
+        """A position (3, m) in odom itself, of one as if the base stood level."""
+        out: Array = position if self.T_odom_level is None else self.T_odom_level.act(position)
+        return out
+
+    def levelled(self, position: Array) -> Array:
+        """The inverse of `tilted`."""
+        out: Array = position if self.T_odom_level is None else self.T_odom_level.actInv(position)
+        return out
+
     def level(self, seen: _Seen) -> _Seen:
         """What was seen, with its position in odom as if the base stood level."""
         if self.T_odom_level is None or seen is None or seen.position is None:
             return seen
-        return replace(seen, position=vector3(self.T_odom_level.actInv(np.array(seen.position))))
+        return replace(seen, position=vector3(self.levelled(np.array(seen.position))))
 
     def configuration_in_map(self, q: Array) -> Array:
         """The same configuration (12) with the base where it is in map. Height and tilt of the ground are left out."""

@@ -50,7 +50,7 @@ class Rocking:
         rate = pin.log3(self._camera.T @ camera) / DT + self.bias + self.noise * self.random.standard_normal(3)
         force = camera.T @ (np.array([0.0, 0.0, GRAVITY]) + self.pushed)
         self._camera, self.now = camera, self.now + DT
-        sample = Inertial(rate, force) if sees else None
+        sample = Inertial(self.now, rate, force) if sees else None
         self.estimate.update(sample, self.q, (self.q - before) / DT, 0.0, self.now)
 
     def stand(self, seconds: float) -> None:
@@ -140,18 +140,57 @@ def test_a_camera_that_is_turned_on_its_hand_is_noticed_by_motions_of_the_arm() 
     assert abs(robot.off - before) < 0.4 * unaware
 
 
+def test_a_robot_that_drives_at_once_goes_by_its_wheels_until_it_has_stood() -> None:
+    """One sample is no bias: its noise would turn the base by degrees in a row."""
+    robot = Rocking(bias=np.array([0.0, 0.0, 0.02]), noise=0.0024)
+    robot.stand(0.1)
+    robot.roll(robot.R, 10.0)
+    assert not robot.estimate.measured and robot.off == 0.0
+    robot.stand(1.0)
+    robot.roll(about(z=0.3))
+    assert robot.estimate.measured and robot.off < 0.003
+
+
+def test_a_sample_that_is_told_twice_counts_once_and_a_missing_one_is_made_up_for_by_the_next() -> None:
+    robot = Rocking()
+    robot.stand(1.0)
+    start = robot.now
+    for k in range(1, 101):
+        robot.step(about(z=0.003 * k), wheels=2.0)
+        camera = robot.camera()
+        again = Inertial(robot.now, np.zeros(3), camera.T @ [0.0, 0.0, GRAVITY])
+        robot.estimate.update(again, robot.q, np.full(NXI, 1.0), 0.0, robot.now)
+    assert robot.now > start and robot.off < 0.002
+
+
+def test_a_push_on_a_parked_base_is_not_taken_for_a_turn_of_the_camera() -> None:
+    robot = Rocking()
+    robot.stand(1.0)
+    arm = ARM + 0.4
+    start, pushed = robot.q[2:].copy(), about(x=0.15)
+    for k in range(1, 101):
+        robot.step(pin.exp3(k / 100 * pin.log3(pushed)), start + k / 100 * (arm - start))
+    robot.stand(0.5)
+    for k in range(1, 101):
+        robot.step(pin.exp3((1.0 - k / 100) * pin.log3(pushed)), arm + k / 100 * (start - arm))
+    robot.stand(3.0)
+    robot.roll(robot.R, arm=arm)
+    assert robot.off < 0.01
+
+
 @pytest.mark.parametrize("stands_first", [True, False])
 def test_without_samples_or_a_bias_the_base_turns_as_its_wheels_say(stands_first: bool) -> None:
-    estimate, sample = BaseOrientation(RobotModel()), Inertial(np.zeros(3), np.array([0.0, -GRAVITY, 0.0]))
+    estimate, up = BaseOrientation(RobotModel()), np.array([0.0, -GRAVITY, 0.0])
     xi, speed, now = np.array([0.0, 0.0, *ARM]), np.zeros(NXI), 0.0
     for _ in range(100 if stands_first else 0):
         now += DT
-        estimate.update(sample, xi, speed, 0.0, now)
+        estimate.update(Inertial(now, np.zeros(3), up), xi, speed, 0.0, now)
     speed[:2] = -1.0, 1.0
     for _ in range(100):
         now += DT
-        estimate.update(None if stands_first else sample, xi, speed, 0.003, now)
+        estimate.update(None if stands_first else Inertial(now, np.zeros(3), up), xi, speed, 0.003, now)
     assert attitude_of(estimate.R, 0.0)[1] == pytest.approx(0.3)
+    assert not estimate.measured
 
 
 @pytest.mark.parametrize("number", [math.nan, math.inf])
@@ -159,8 +198,9 @@ def test_a_sample_that_is_no_number_spoils_nothing(number: float) -> None:
     robot = Rocking()
     robot.stand(1.0)
     robot.roll(about(x=0.04))
-    robot.estimate.update(Inertial(np.full(3, number), np.zeros(3)), robot.q, np.zeros(NXI), 0.0, robot.now + DT)
-    robot.now += DT
+    for rate, position in ((np.full(3, number), robot.q), (np.zeros(3), np.full(NXI, number))):
+        robot.now += DT
+        robot.estimate.update(Inertial(robot.now, rate, np.zeros(3)), position, np.zeros(NXI), number, robot.now)
     robot.roll(about(x=-0.04))
     assert robot.off < 0.002
 

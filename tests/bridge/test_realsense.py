@@ -90,11 +90,11 @@ def test_the_newest_of_both_inertial_sensors_is_told_while_it_is_fresh(device: S
     motion = SoftwareMotion()
     camera = RealSense(device, rs.align(rs.stream.color), motion)
     assert camera.inertial() is None
-    motion.feel(Inertial(np.array([0.1, -0.2, 0.3]), np.array([0.0, -9.81, 0.5])))
+    motion.feel(Inertial(1.0, np.array([0.1, -0.2, 0.3]), np.array([0.0, -9.81, 0.5])))
     told = camera.inertial()
     assert told is not None
     assert told.rate == pytest.approx([0.1, -0.2, 0.3]) and told.force == pytest.approx([0.0, -9.81, 0.5])
-    motion.feel(Inertial(np.array([0.4, 0.0, 0.0]), np.array([0.0, -9.8, 0.0])))
+    motion.feel(Inertial(1.005, np.array([0.4, 0.0, 0.0]), np.array([0.0, -9.8, 0.0])))
     newer = camera.inertial()
     assert newer is not None and newer.rate == pytest.approx([0.4, 0.0, 0.0])
     time.sleep(0.1)
@@ -110,11 +110,15 @@ def test_samples_come_over_the_wire_as_they_were_sent() -> None:
             heard[key] = callback
 
     motion = WireMotion(Wire())  # type: ignore[arg-type]
-    heard[INERTIAL_KEY](pack_inertial(Inertial(np.array([0.5, -0.25, 2.0]), np.array([1.0, -9.5, 0.125]))), 0.0)
+    heard[INERTIAL_KEY](pack_inertial(Inertial(3.25, np.array([0.5, -0.25, 2.0]), np.array([1.0, -9.5, 0.125]))), 0.0)
     told = motion.newest()
     motion.close()
     assert told is not None
-    assert told.rate.tolist() == [0.5, -0.25, 2.0] and told.force.tolist() == [1.0, -9.5, 0.125]
+    assert (
+        told.at == pytest.approx(3.25)
+        and told.rate.tolist() == [0.5, -0.25, 2.0]
+        and told.force.tolist() == [1.0, -9.5, 0.125]
+    )
 
 
 def test_a_camera_whose_inertial_sensors_are_not_read_tells_none(camera: RealSense) -> None:

@@ -2,12 +2,17 @@
 
 import msgspec
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from controller.config import ControllerConfig
+from controller.motion.follower import Measured
+from controller.motion.tool_motion import Leg, ToolMotion
+from controller.work.servo import CutServo
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.messages.perception import ON_THE_WAY, CutSight
+from rolling_panda.model.robot import RobotModel
 from rolling_panda.model.wire_values import vector3
 from tests.support.controller_at_work import CONFIG, entry, finish, run_until, working
 from tests.support.controller_config import controller_config
@@ -184,3 +189,31 @@ def test_a_point_that_turns_out_to_be_on_another_cane_is_left_on_the_way(monkeyp
     r.show((msgspec.structs.replace(SHOWN[0], revision=2, cane=1),))
     finish(r, 30.0)
     assert r.cuts == [] and entry(r, "a").state == "PROPOSED"
+
+
+def test_ground_that_carries_the_cut_elsewhere_is_no_error_of_the_motion():
+    """The motion follows the ground by itself: pictures that show the cut there ask for no more."""
+    servo, goal = CutServo(SERVO.work), pin.SE3(np.eye(3), PLACE)
+    servo.begin("a", goal)
+    by = np.array([0.006, 0.0, -0.004])
+    servo.carry(by)
+    carried = ToolMotion(
+        SERVO.motion,
+        SERVO.whole_body,
+        pin.SE3(np.eye(3), PLACE - [0.0, 0.0, 0.2]),
+        np.zeros(12),
+        [Leg(pin.SE3(np.eye(3), PLACE + by), np.zeros(12), 0.3)],
+    )
+    robot = Measured(np.zeros(12), RobotModel().kinematics(np.zeros(12)), np.zeros(9))
+    for number in range(1, 6):
+        servo.asked(number, 0.1 * number)
+        sight = CutSight(
+            header=m.Header(0.1 * number, "odom"),
+            point_id="a",
+            number=number,
+            position=vector3(PLACE + by),
+            covariance=SURE,
+        )
+        servo.update(sight, 0.1 * number + 0.05)
+        servo.correct(carried, robot)
+    np.testing.assert_allclose(carried.goal.translation, PLACE + by, atol=1e-9)

@@ -200,3 +200,26 @@ def test_an_arm_that_settles_stays_as_it_is_and_the_tool_where_it_should_be():
     np.testing.assert_array_equal(path.posture().q, np.arange(12.0))
     assert not path.posture().rate.any() and path.posture().goal is None
     np.testing.assert_array_equal(path.desired().T_odom_tool.homogeneous, before.T_odom_tool.homogeneous)
+
+
+@given(st.lists(st.tuples(places, places), min_size=2, max_size=6), st.booleans())
+def test_corrections_that_are_made_stay_made_whatever_follows(shifts, frozen):
+    """Uneven ground asks for many: those that have ended are kept as one."""
+    level = (0.0, 0.0, 0.0)
+    corners = [
+        pose(*each) for each in (((0, 0, 0.8), level), ((0.3, 0.1, 0.9), (0.2, 0.0, 0.1)), ((0.6, 0, 1.0), level))
+    ]
+    path, plain = motion(corners, frozen), motion(corners, frozen)
+    moved, driven = np.zeros(3), np.zeros(2)
+    for by, base in shifts:
+        path.advance(1.0, 0.0)
+        before = path.desired().T_odom_tool.translation
+        path.shift(0.01 * np.array(by), 0.01 * np.array(base[:2]))
+        np.testing.assert_allclose(path.desired().T_odom_tool.translation, before, atol=1e-12)
+        moved, driven = moved + 0.01 * np.array(by), driven + 0.01 * np.array(base[:2])
+        path.time += 1.0
+        np.testing.assert_allclose(
+            path.desired().T_odom_tool.translation - at(plain, path.time).T_odom_tool.translation, moved, atol=1e-9
+        )
+        if path.posture().q[:2].any():
+            np.testing.assert_allclose(path.posture().q[:2] - plain.posture().q[:2], driven, atol=1e-9)

@@ -78,6 +78,9 @@ def sees(row: list[Body], true: np.ndarray, odom: np.ndarray, rng: np.random.Gen
 class Drive:
     """A base that drives along a row; wheels that slip by some share, and turn it by so much a metre."""
 
+    #: Whether inertial sensors have corrected the odometry.
+    inertial = False
+
     def __init__(self, row: list[Body], seed: int, slip: float = 0.0, turns: float = 0.0, known: bool = False) -> None:
         self.row, self.slip, self.turns = row, slip, turns
         self.rng = np.random.default_rng([seed, 7])
@@ -96,10 +99,10 @@ class Drive:
             rolled = (1.0 + self.slip) * way
             self.odom = self.odom + [rolled * np.cos(self.odom[2]), rolled * np.sin(self.odom[2]), turned]
             self.now += step / 0.15
-            self.look() if looks else self.localiser.predict(self.odom, self.now)
+            self.look() if looks else self.localiser.predict(self.odom, self.now, self.inertial)
 
     def look(self) -> None:
-        self.localiser.predict(self.odom, self.now)
+        self.localiser.predict(self.odom, self.now, self.inertial)
         self.localiser.update(*sees(self.row, self.true, self.odom, self.rng))
 
     @property
@@ -236,3 +239,15 @@ def test_uneven_ground_is_followed_and_forgotten():
     drive.go(2.0, looks=False)
     after = drive.localiser.estimate.T_map_base
     assert abs(after.translation[2]) < 1e-3 and np.abs(pin.log3(after.rotation)[:2]).max() < 1e-3
+
+
+def test_what_inertial_sensors_leave_of_height_and_tilt_adds_up_and_what_the_ground_makes_comes_back() -> None:
+    spread = {}
+    for inertial in (False, True):
+        localiser, variances = RowLocaliser(), []
+        for k in range(41):
+            estimate = localiser.predict(np.array([0.2 * k, 0.0, 0.0]), 2.0 * k, inertial)
+            variances.append(np.diag(estimate.covariance)[2:5])
+        spread[inertial] = np.array(variances)
+    ground, sensors = (each[40] / each[10] for each in (spread[False], spread[True]))
+    assert np.all(ground < 1.1) and np.all(sensors > 2.0)

@@ -42,7 +42,7 @@ class OnePicture:
     def inertial(self) -> Inertial | None:
         if (now := time.monotonic()) - self._felt_at > _SAMPLE_S:
             self._felt_at = now
-            self._motion.feel(Inertial(np.zeros(3), np.array([0.0, -GRAVITY, 0.0])))
+            self._motion.feel(Inertial(now, np.zeros(3), np.array([0.0, -GRAVITY, 0.0])))
         return self._motion.newest()
 
     def capture(self, expose: bool) -> Picture | None:

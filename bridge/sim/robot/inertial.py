@@ -38,4 +38,4 @@ class InertialSensors:
         """What they measure now; `data` is MuJoCo's."""
         off = self._bias + self._noise * self._random.standard_normal(6)
         rate, force = data.sensor(GYROSCOPE).data, data.sensor(ACCELEROMETER).data
-        return Inertial(self._scale * (self._R @ rate) + off[:3], self._R @ force + off[3:])
+        return Inertial(float(data.time), self._scale * (self._R @ rate) + off[:3], self._R @ force + off[3:])
