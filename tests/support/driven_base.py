@@ -4,6 +4,7 @@ import numpy as np
 import pinocchio as pin
 
 from bridge.config import OdometryConfig
+from bridge.core.interface import NO_CUT, Measurement
 from bridge.core.odometer import Odometer
 from controller.config import ControllerConfig
 from controller.motion.body import BaseEstimate, wheels_ahead
@@ -53,7 +54,8 @@ class DrivenBase:
     def from_odometry(self):
         """Configuration and speeds of the wheels from the newest odometry."""
         now = self.ticks * self.dt
-        self.odometer.follow(self.q[3:5])
+        speeds = np.concatenate([self.wheels, self.arm])
+        self.odometer.follow(Measurement(self.q[3:].copy(), speeds, "open", "", "", NO_CUT), now)
         if self.ticks % round(0.02 / self.dt) == 0:
             self.odometer.measure(self.ticks, now, self.wheels)
         self.odometry = self.odometer.due(self.ticks) or self.odometry

@@ -14,6 +14,7 @@ from controller.supervision.modes import Event
 from controller.work.cutting import Blades
 from controller.work.movement import MotionResult
 from rolling_panda import reasons
+from rolling_panda.model.map_frame import MapFrame
 from rolling_panda.model.robot import RobotModel
 
 MODEL = RobotModel()
@@ -131,7 +132,7 @@ class Movement:
         nothing = SimpleNamespace(reason=None, model=SimpleNamespace(nearest=None))
         contact = SimpleNamespace(touch=None, lost=False, force=None)
         self.body = SimpleNamespace(
-            robot=MODEL, measured=None, tracking_error=nothing, surroundings=nothing, contact=contact
+            frame=MapFrame(), robot=MODEL, measured=None, tracking_error=nothing, surroundings=nothing, contact=contact
         )
         self.sequence = Sequence(config, queue, run_id, self.chance, permit)
         follower = SimpleNamespace(jog=lambda xi, robot: SimpleNamespace(xi=np.clip(xi, -0.03, 0.03)))
