@@ -123,7 +123,7 @@ class SoftwareMotion(MotionSamples):
         self._profiles = [self._stream(rs.stream.gyro, 4), self._stream(rs.stream.accel, 5)]
         self._sensor.open(self._profiles)
         self._sensor.start(self)
-        self._number = 0
+        self._number, self._closed = 0, False
 
     def feel(self, sample: Inertial) -> None:
         """One sample of both."""
@@ -137,9 +137,11 @@ class SoftwareMotion(MotionSamples):
             self._sensor.on_motion_frame(frame)
 
     def close(self) -> None:
-        """Stop both streams."""
-        self._sensor.stop()
-        self._sensor.close()
+        """Stop both streams; safe to call twice."""
+        if not self._closed:
+            self._closed = True
+            self._sensor.stop()
+            self._sensor.close()
 
     def _stream(self, kind: Any, uid: int) -> Any:
         stream, scale = rs.motion_stream(), rs.motion_device_intrinsic()
