@@ -216,9 +216,9 @@ def judged_cuts(
 def _blocked(
     loop: ClosedLoop, accepted: Sequence[m.QueueEntry], row: Row, wanted: Collection[WantedCut]
 ) -> dict[str, Blocker]:
-    """Accepted points whose right cut nothing can make for want of room, by name, with what is in its way.
+    """What leaves no room for the right cut of each accepted point, by the point's name; empty where there is room.
 
-    A point belongs to the right cut of its kind that is nearest to it as the robot stands now, within `_OF_POINT`.
+    The right cut of a point is the nearest one of its kind, within `_OF_POINT`. Points without one are left out.
     """
     shown, localisation = loop.inbox.newest(m.PruningPoints), loop.inbox.newest(m.Localisation)
     if shown is None:

@@ -1,11 +1,12 @@
 """How the base is turned in odom, from the gyroscope and accelerometer of the camera on the arm's hand.
 
-The gyroscope tells how the camera turns, the joints how it turns on the base; what is left is the base. While the robot
-stands, what the gyroscope tells is its bias. While only the wheels stand, the base does not turn: what seems to be left
-then tells how the camera is turned on the hand, against what the model has. Gravity, by the accelerometer, keeps roll
-and pitch from drifting; nothing keeps the heading, which drifts far less than that of wheels that slip.
+The gyroscope measures the rotation of the camera, and the joints its rotation on the base. The difference is the
+rotation of the base. While the robot is at rest the gyroscope measures its own bias. While only the wheels are at rest
+the base does not rotate: the difference is then an error of the camera's mounting, which is estimated. The
+accelerometer corrects the drift of roll and pitch. The heading is not corrected; it drifts far less than that of wheels
+that slip.
 
-Odom is level with the base where the robot was switched on, so that up is a direction that is measured there.
+Odom is level with the base where the robot was switched on. The direction of gravity in odom is measured there.
 """
 
 import math
@@ -95,6 +96,7 @@ class BaseOrientation:
         speed = np.abs(velocity)
         if self._rolled_at is None:
             self._rolled_at = self._moved_at = now
+        # A speed that is no number counts as motion.
         if not speed.max() <= _STANDS:
             self._moved_at, self._has_moved = now, self._has_moved or self._stood >= _KNOWN_S
         if not speed[:2].max() <= _STANDS:
@@ -189,7 +191,7 @@ class _MountEstimate:
         self._start = None
         variance = _NOISE**2 + (_SCALE * angle) ** 2
         surprise = float(np.linalg.norm(left - off @ self._turn))
-        # Someone leans on the base, or it sinks in.
+        # Not an error of the mounting: someone leans on the base, or it sinks in.
         if surprise > _PLAUSIBLE * math.sqrt(variance + (_MOUNT * float(np.linalg.norm(off, 2))) ** 2):
             return
         self._information = self._information + off.T @ off / variance

@@ -113,7 +113,7 @@ class WireFrames:
 
 
 class SoftwareMotion(MotionSamples):
-    """Gyroscope and accelerometer of one camera; `newest` returns what was felt last."""
+    """Gyroscope and accelerometer of one camera, with samples given by `feel`."""
 
     def __init__(self) -> None:
         """Streaming, nothing felt yet."""

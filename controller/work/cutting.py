@@ -16,7 +16,6 @@ from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
-import pinocchio as pin
 
 from controller.config import ControllerConfig, WorkConfig
 from controller.motion.contact import ContactMonitor, Touch
@@ -49,7 +48,7 @@ from rolling_panda.messages.perception import ON_THE_WAY, CloseUpResult, CutSigh
 from rolling_panda.messages.types import Reason
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.map_frame import MapFrame
-from rolling_panda.model.robot import ARM_Q, ARM_XI
+from rolling_panda.model.robot import ARM_Q, ARM_XI, on_plane
 from rolling_panda.model.wire_values import vector3
 
 #: A cut command is repeated this often until the bridge has seen it (s).
@@ -157,7 +156,7 @@ class ApproachSegments:
             return (Leg(plan.poses.clear, plan.q_clear, speed),)
         # The base moves with the arm at rest; then the arm moves alone.
         q_there = at_base(q, plan.q_clear)
-        carried = _base_pose(q_there) * _base_pose(q).inverse() * T_odom_tool
+        carried = on_plane(q_there) * on_plane(q).inverse() * T_odom_tool
         return Leg(carried, q_there, speed), Leg(plan.poses.clear, plan.q_clear, speed, math.inf)
 
     def into(self, plan: CutPlan) -> Leg:
@@ -176,10 +175,6 @@ def at_base(q_arm: Array, q_base: Array) -> Array:
     out = q_base.copy()
     out[ARM_Q] = q_arm[ARM_Q]
     return out
-
-
-def _base_pose(q: Array) -> Any:
-    return pin.SE3(pin.exp3(np.array([0.0, 0.0, q[2]])), np.array([q[0], q[1], 0.0]))
 
 
 #: Smaller refinements of a point by perception are ignored (m).

@@ -21,6 +21,7 @@ from perception.calibration.hand_eye import CalibrationError
 from rolling_panda import reasons
 from rolling_panda.calibration.file import FARTHEST_APART, FARTHEST_WHEELS
 from rolling_panda.model.differential_drive import WheelSizes, arc
+from rolling_panda.model.robot import on_plane
 
 #: Fewest pictures; least way and turn between two of them (m, rad).
 FEWEST, LEAST_WAY, LEAST_TURN = 10, 0.3, 0.35
@@ -149,11 +150,6 @@ def _camera_board(view: BaseView) -> tuple[Any, Array]:
     return seen, J.T @ J / sd**2
 
 
-def _planar(pose: Array) -> Any:
-    """T_odom_base (pin.SE3) of a planar pose (3)."""
-    return pin.SE3(pin.exp3(np.array([0.0, 0.0, pose[2]])), np.array([pose[0], pose[1], 0.0]))
-
-
 def _relative(a: Array, b: Array) -> Array:
     """Pose b in the frame of pose a (3)."""
     c, s = np.cos(a[2]), np.sin(a[2])
@@ -178,7 +174,7 @@ class _Problem:
         self.expect(_SHARE)
         self.T_base_camera = views[0].T_base_camera
         self.seen, informations = zip(*(_camera_board(view) for view in views), strict=True)
-        self.T_odom_board = _planar(self.odometry[0]) * self.T_base_camera * self.seen[0]
+        self.T_odom_board = on_plane(self.odometry[0]) * self.T_base_camera * self.seen[0]
         self.whiten = [self._whitening(*each) for each in zip(self.odometry, informations, strict=True)]
 
     def expect(self, share: float) -> None:
@@ -188,7 +184,7 @@ class _Problem:
     def _whitening(self, pose: Array, information: Array) -> Array:
         """Pitch, roll and height of the base, which are unknown, make the camera less certain of them."""
         free = np.diag([_HEIGHT**2, _TILT**2, _TILT**2])
-        A = (self.T_odom_board.inverse() * _planar(pose)).action[:, [2, 3, 4]]
+        A = (self.T_odom_board.inverse() * on_plane(pose)).action[:, [2, 3, 4]]
         covariance = np.linalg.inv(information) + A @ free @ A.T
         out: Array = np.linalg.cholesky(np.linalg.inv(covariance)).T
         return out
@@ -215,7 +211,7 @@ class _Problem:
         T_odom_board = self.T_odom_board * pin.exp6(x[9:15])
         out = [self.leg_errors(x).ravel() / self.leg_sd.ravel()]
         for pose, seen, whiten in zip(poses, self.seen, self.whiten, strict=True):
-            expected = T_camera_base * _planar(pose).actInv(T_odom_board)
+            expected = T_camera_base * on_plane(pose).actInv(T_odom_board)
             out.append(whiten @ pin.log6(seen.actInv(expected)).vector)
         return np.concatenate([*out, x[1:2] / _APART, x[3:6] / _CAMERA_SHIFT, x[6:9] / _CAMERA_TURN])
 

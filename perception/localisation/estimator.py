@@ -18,6 +18,7 @@ import pinocchio as pin
 from perception.arrays import Array
 from perception.localisation.row_map import Neighbourhood, RowMap
 from perception.localisation.sighting import ALONG, CANE, UPRIGHT, WIRES, Sighting
+from rolling_panda.model.robot import on_plane
 
 State = Literal["odometry", "located", "lost"]
 Cause = Literal["", "time ran back", "odometry jumped", "other wood", "too far without wood"]
@@ -139,7 +140,7 @@ class RowLocaliser:
         """The present estimate."""
         T_map_base = _placement(self._pose)
         odom = np.zeros(3) if self._odom is None else self._odom
-        T_odom_base = _planar(odom)
+        T_odom_base = on_plane(odom)
         return Estimate(
             T_map_base * T_odom_base.inverse(),
             T_map_base,
@@ -399,10 +400,6 @@ def _jacobian(levers: Array) -> Array:
     J[:, 1, 3], J[:, 1, 5] = -z, x
     J[:, 2, 3], J[:, 2, 4] = y, -x
     return J
-
-
-def _planar(pose: Array) -> pin.SE3:
-    return pin.SE3(pin.exp3(np.array([0.0, 0.0, pose[2]])), np.array([pose[0], pose[1], 0.0]))
 
 
 def _placement(pose: Array) -> pin.SE3:

@@ -11,7 +11,9 @@ Unit = Annotated[float, Meta(ge=-1.001, le=1.001)]
 NonNegative = Annotated[float, Meta(ge=0.0, le=1e9)]
 Fraction = Annotated[float, Meta(ge=0.0, le=1.0)]
 Angle = Annotated[float, Meta(ge=-1e6, le=1e6)]
-Tilt = Annotated[float, Meta(ge=-0.5, le=0.5)]
+#: A base that stood more steeply would fall over (rad).
+MOST_TILT: Final = 0.5
+Tilt = Annotated[float, Meta(ge=-MOST_TILT, le=MOST_TILT)]
 Speed = Annotated[float, Meta(ge=-100.0, le=100.0)]
 Count = Annotated[int, Meta(ge=0, le=2**62)]
 #: The epoch increases by one with each fencing token that the bridge issues. At one a second this lasts for 30 years.

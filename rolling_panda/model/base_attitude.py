@@ -11,9 +11,9 @@ import numpy as np
 import pinocchio as pin
 
 from rolling_panda.messages.robot import CameraFrame
-from rolling_panda.messages.types import BaseAttitude, PlanarPose
+from rolling_panda.messages.types import MOST_TILT, BaseAttitude, PlanarPose
 from rolling_panda.model.differential_drive import Array
-from rolling_panda.model.robot import RobotModel, configuration
+from rolling_panda.model.robot import RobotModel, configuration, on_plane
 
 
 def rotation(attitude: BaseAttitude) -> Array:
@@ -27,15 +27,14 @@ def attitude_of(R: Array, height: float) -> tuple[BaseAttitude, float]:
 
     Roll and pitch are bounded to what a message can tell.
     """
-    bound = 0.5
-    pitch = min(max(-math.asin(min(max(R[2, 0], -1.0), 1.0)), -bound), bound)
-    roll = min(max(math.atan2(R[2, 1], R[2, 2]), -bound), bound)
+    pitch = min(max(-math.asin(min(max(R[2, 0], -1.0), 1.0)), -MOST_TILT), MOST_TILT)
+    roll = min(max(math.atan2(R[2, 1], R[2, 2]), -MOST_TILT), MOST_TILT)
     return BaseAttitude(height, roll, pitch), math.atan2(R[1, 0], R[0, 0])
 
 
 def T_odom_base(base: PlanarPose, attitude: BaseAttitude | None = None) -> Any:
     """The base in odom (pin.SE3): its pose on the plane, and how it stands there."""
-    T_odom_footprint = pin.SE3(pin.exp3(np.array([0.0, 0.0, base.phi])), np.array([base.x, base.y, 0.0]))
+    T_odom_footprint = on_plane(np.array([base.x, base.y, base.phi]))
     if attitude is None:
         return T_odom_footprint
     return T_odom_footprint * pin.SE3(rotation(attitude), np.array([0.0, 0.0, attitude.height]))

@@ -23,7 +23,7 @@ from rolling_panda.model.robot import RobotModel, placement
 from rolling_panda.model.wire_values import vector3
 
 _ORIGIN = Pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
-#: The base carries what is within so far of its place. It stands as before where that has moved less than this (m).
+#: Radius of what the base carries, and the largest movement within it that is ignored (m).
 _REACH, _MOVED = 1.2, 0.0007
 
 _Seen = TypeVar("_Seen", CloseUpResult | None, CutSight | None)

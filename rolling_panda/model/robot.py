@@ -148,6 +148,11 @@ def configuration(base: m.PlanarPose, position: m.Actuated) -> Array:
     return np.array([base.x, base.y, base.phi, *position])
 
 
+def on_plane(pose: Array) -> Any:
+    """The pin.SE3 of a pose on the plane: x, y (m), heading (rad); more is ignored."""
+    return pin.SE3(pin.exp3(np.array([0.0, 0.0, pose[2]])), np.array([pose[0], pose[1], 0.0]))
+
+
 def pose_message(placement: Any) -> m.Pose:
     """The wire form of a pin.SE3."""
     x, y, z = (float(value) for value in placement.translation)
