@@ -3263,6 +3263,16 @@ def setpoints_arrive() -> None:
     """Setpoints arrive: the robot follows."""
 
 
+@_reason("warning", "check the camera's cable; until then odometry is by the wheels alone")
+def inertial_lost() -> None:
+    """The camera's inertial sensors send nothing."""
+
+
+@_reason("info", "")
+def inertial_works() -> None:
+    """The camera's inertial sensors work again."""
+
+
 @_reason("warning", "")
 def robot_faulty(cause: Reason) -> None:
     """The robot does not move: {cause}."""

@@ -146,6 +146,7 @@ class BridgeCore:
         self._was_tripped = True
         self._measured = self._calibration.measured(robot.read())
         self._odometer.follow(self._measured, 0.0)
+        self._inertial_lost = False
         self._cut_id = ""
         self._outcome: m.Outcome = ""
         self._relaxed_limits = relaxed_limits
@@ -350,7 +351,7 @@ class BridgeCore:
         joints = odometry = state = frame = None
         ticks = self._ticks
         if ticks % self._joint_ticks == 0:
-            self._odometer.follow(self._measured, now)
+            self._follow_odometry(now)
             joints = self._joint_state(now)
             self._validator.sent(joints.sequence, now)
             self._round_trip.out(joints.sequence, self._clock)
@@ -384,6 +385,18 @@ class BridgeCore:
             tuple(m.LogEvent(header=m.Header(now), process="bridge", reason=told) for told in events),
             stops,
         )
+
+    def _follow_odometry(self, now: float) -> None:
+        before = self._odometer.attitude
+        self._odometer.follow(self._measured, now)
+        after = self._odometer.attitude
+        if before is None or after is None or before.measured == after.measured:
+            return
+        if not after.measured:
+            self._log(reasons.inertial_lost())
+        elif self._inertial_lost:
+            self._log(reasons.inertial_works())
+        self._inertial_lost = not after.measured
 
     def _joint_state(self, now: float) -> m.JointState:
         torque = self._measured.external_torque

@@ -6,10 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bridge.config import BridgeConfig
+from bridge.config import BridgeConfig, OdometryConfig
+from bridge.core.attitude import GRAVITY, BaseOrientation, Inertial
 from bridge.core.bridge import MOVING_CUT, TICK_S, BridgeCore, BridgeOutputs
 from bridge.core.cut_orders import BUSY
 from bridge.core.interface import Measurement
+from bridge.core.odometer import Odometer
 from bridge.core.picture import Picture
 from bridge.core.state_memory import Remembered
 from bridge.core.validator import HELD, MOVING, OLD_SEQUENCE
@@ -17,6 +19,7 @@ from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.model.differential_drive import Array
+from rolling_panda.model.robot import RobotModel
 from rolling_panda.reasons import button_pressed, said, severity_of, text_of
 from rolling_panda.runtime.latest_file import KeptValue
 from rolling_panda.topics import CUT, MOTION, ODOMETRY, TOKEN, Topic
@@ -305,6 +308,36 @@ def test_the_blades_close_only_while_wheels_and_joints_are_slow(actuator: int, s
     bench.core.on_cut(cut(bench, "c1"), bench.now)
     assert robot.cuts == (["c1"] if cuts else [])
     assert refused_cuts(bench) == ({} if cuts else {MOVING_CUT: 1})
+
+
+class Feeling(IdealRobot):
+    """At rest on level ground, with inertial sensors that can fall silent."""
+
+    silent = False
+    reads = 0
+
+    def read(self) -> Measurement:
+        self.reads += 1
+        if self.silent:
+            return replace(self.now, inertial=None)
+        on_base = MODEL.pose(np.concatenate([np.zeros(3), self.now.position]), MODEL.camera_id).rotation
+        force = on_base.T @ np.array([0.0, 0.0, GRAVITY])
+        return replace(self.now, inertial=Inertial(self.reads * TICK_S, np.zeros(3), force))
+
+
+def test_inertial_sensors_that_fall_silent_are_told_once_and_so_is_their_return(bench: Bench) -> None:
+    robot = Feeling()
+    followed = Odometer(MODEL.drive, OdometryConfig(), TICK_S, 0, BaseOrientation(RobotModel()))
+    bench.robot, bench.core = robot, BridgeCore(robot, BridgeConfig(), MODEL.limits, followed, "sim")
+    told = []
+    for silent in (False, True, False):
+        robot.silent = silent
+        told.append([line for _ in range(1500) for line in lines(tick(bench))])
+    assert told == [
+        [],
+        [("warning", text_of(reasons.inertial_lost()))],
+        [("info", text_of(reasons.inertial_works()))],
+    ]
 
 
 def test_following_and_its_end_are_told_at_once(bench: Bench) -> None:
