@@ -19,10 +19,13 @@ from rolling_panda.model.wire_values import vector3
 
 #: Axes nearer to each other than this are one cane (m).
 _SAME_CANE = 0.015
+#: Part of a cane by which two observations are aligned (m from the base), and how many of its points that takes.
+_NEAR_BASE, _ALIGNED = 0.25, 5
 #: Nodes nearer than this along a cane are one (m).
 _SAME_NODE = 0.018
-#: Share of a cane's observations that must have shown a node.
-_MIN_SHARE = 0.4
+#: A node counts if at least this share of the frames that show its place show it. A cut past a node that is none loses
+#: one that stays; past one too many it can be made again.
+_MIN_SHARE = 0.6
 #: Observations that a mean covers.
 _WINDOW = 20
 #: Stretches of a cane that are told apart by whether a frame has shown them (m), and how many there are.
@@ -76,6 +79,9 @@ class KnownNode:
 class KnownCane:
     """A cane over all observations.
 
+    Frames see the base at different places, where the border of spur and cane is unclear. So observations are aligned
+    by their places in space, and all arc lengths are measured from the median of the bases, to half a stretch.
+
     Attributes:
         number: Number on its spur.
         best: The most complete observation.
@@ -83,6 +89,7 @@ class KnownCane:
         base: Estimate (3, m, odom).
         nodes: Seen at least once, by arc length.
         radii: Newest measurements (m).
+        bases: Newest measurements of the base, by arc length (m).
         shown: How many frames have shown each stretch, from the base.
         cut_at: Arc length of a cut that was made (m); infinite while the cane stands.
     """
@@ -93,6 +100,7 @@ class KnownCane:
     base: Estimate
     nodes: list[KnownNode] = field(default_factory=list)
     radii: deque[float] = field(default_factory=lambda: deque(maxlen=_WINDOW))
+    bases: deque[float] = field(default_factory=lambda: deque([0.0], maxlen=_WINDOW))
     shown: NDArray[np.int64] = field(default_factory=lambda: np.zeros(_STRETCHES, dtype=np.int64))
     cut_at: float = np.inf
 
@@ -105,8 +113,11 @@ class KnownCane:
         known.shown += _shown(cane)
         return known
 
-    def add(self, cane: Cane) -> None:
-        """Add an observation."""
+    def add(self, cane: Cane) -> Cane:
+        """Add an observation; returns it with arc lengths from the base of all."""
+        offset = self._offset(cane)
+        self.bases.append(offset)
+        cane = _shifted(cane, offset - self._move_base(round(float(np.median(self.bases)) / _STRETCH)))
         self.radius.add(np.array([cane.radius]))
         self.radii.append(cane.radius)
         self.shown += _shown(cane)
@@ -122,31 +133,56 @@ class KnownCane:
             else:
                 self.nodes.append(KnownNode(Estimate.of(np.array([node.arc])), node.pixels))
         self.nodes.sort(key=lambda node: node.arc)
+        return cane
+
+    def _offset(self, cane: Cane) -> float:
+        """By how much an observation's arc lengths are less than those of the map (m); 0 where that is not seen."""
+        near, axis = cane.arc < _NEAR_BASE, self.best.axis
+        away = cdist(cane.axis[near], axis)
+        nearest = away.argmin(axis=1)
+        # Points that are nearest to an end may lie beyond it.
+        inside = (nearest > 0) & (nearest < len(axis) - 1) & (away.min(axis=1) < _SAME_CANE)
+        if np.count_nonzero(inside) < _ALIGNED:
+            return 0.0
+        own, nearest = np.flatnonzero(near)[inside], nearest[inside]
+        chord = axis[nearest + 1] - axis[nearest - 1]
+        tangent = chord / np.maximum(np.linalg.norm(chord, axis=1, keepdims=True), 1e-9)
+        further = np.einsum("ij,ij->i", cane.axis[own] - axis[nearest], tangent)
+        return float(np.median(self.best.arc[nearest] + further - cane.arc[own]))
+
+    def _move_base(self, stretches: int) -> float:
+        """Measure from another base, so many stretches farther out; returns how far that is (m)."""
+        by = stretches * _STRETCH
+        if stretches:
+            self.best, self.cut_at = _shifted(self.best, -by), self.cut_at - by
+            for node in self.nodes:
+                node.estimate.mean = node.estimate.mean - by
+            self.bases = deque((base - by for base in self.bases), maxlen=_WINDOW)
+            self.shown = np.roll(self.shown, -stretches)
+        return by
 
     def with_other_views(self, cane: Cane) -> Cane:
-        """An observation of it with its number, and what other frames have shown of it.
+        """An observation of it, aligned, with its number, and what other frames have shown of it.
 
-        That is the median radius, as single ones may include wood beside it, and what lies in the stretches that this
-        one does not show: they are hidden no longer, and have the nodes that were seen there.
+        That is the median radius, as single ones may include wood beside it, and its nodes as far out as this one goes.
+        Stretches that this one does not show, but another one does, are hidden no longer.
         """
-        hidden = [span for part in cane.hidden for span in self._unseen_of(part)]
-        nodes = [*cane.nodes]
-        for node in self.nodes:
-            inside = any(part.start <= node.arc <= part.end for part in cane.hidden)
-            if inside and self._confirms(node) and all(abs(node.arc - own.arc) >= _SAME_NODE for own in cane.nodes):
-                nodes.append(Node(node.arc, node.pixels))
         return replace(
             cane,
             radius=float(np.median(self.radii)),
-            nodes=tuple(sorted(nodes, key=lambda node: node.arc)),
-            hidden=tuple(hidden),
+            nodes=self._nodes(cane.length),
+            hidden=tuple(span for part in cane.hidden for span in self._unseen_of(part)),
             observations=len(self.radii),
             number=self.number,
         )
 
-    def _confirms(self, node: KnownNode) -> bool:
-        """Whether enough of the frames that have shown its place have shown a node there."""
-        return node.estimate.count >= max(1.0, _MIN_SHARE * float(self.shown[_stretch(node.arc)]))
+    def _nodes(self, length: float) -> tuple[Node, ...]:
+        """The nodes up to an arc length (m) that enough of the frames that show their place have shown."""
+        return tuple(
+            Node(node.arc, node.pixels)
+            for node in self.nodes
+            if node.arc < length and node.estimate.count >= _MIN_SHARE * float(self.shown[_stretch(node.arc)])
+        )
 
     def _unseen_of(self, part: Span) -> list[Span]:
         """The stretches of a hidden one that no frame has shown."""
@@ -165,11 +201,7 @@ class KnownCane:
 
         Nodes beyond what it shows of the cane have no place.
         """
-        nodes = tuple(
-            Node(node.arc, node.pixels)
-            for node in self.nodes
-            if node.estimate.count >= _MIN_SHARE * self.base.count and node.arc < min(self.cut_at, self.best.length)
-        )
+        nodes = self._nodes(min(self.cut_at, self.best.length))
         stands = self.best.arc <= self.cut_at
         if np.count_nonzero(stands) < 2:
             stands[:2] = True
@@ -273,7 +305,7 @@ class PlantMap:
                 known.position.add(spur.position)
                 if not spur.incomplete and (known.best.incomplete or len(spur.canes) > len(known.best.canes)):
                     known.best = spur
-            seen = tuple(_associate(known, cane).with_other_views(cane) for cane in spur.canes)
+            seen = tuple(_associate(known, cane) for cane in spur.canes)
             out.append(replace(known.with_median_stub(spur), canes=seen, hidden=known.hidden_canes(seen)))
         return tuple(out)
 
@@ -316,19 +348,29 @@ class PlantMap:
         return tuple(line for spur in self.spurs for cane in spur.canes if (line := cane.line()))
 
 
-def _associate(spur: KnownSpur, cane: Cane) -> KnownCane:
+def _associate(spur: KnownSpur, cane: Cane) -> Cane:
+    """Add an observation to its cane; returns it with what other frames have shown."""
     near = [(away, known.number) for known in spur.canes if (away := _axis_distance(known.best, cane)) < _SAME_CANE]
     if near:
         same = spur.canes[min(near)[1]]
-        same.add(cane)
-        return same
+        return same.with_other_views(same.add(cane))
     spur.canes.append(KnownCane.of(cane, len(spur.canes)))
-    return spur.canes[-1]
+    return spur.canes[-1].with_other_views(cane)
+
+
+def _shifted(cane: Cane, by: float) -> Cane:
+    """The same cane with arc lengths from another place."""
+    return replace(
+        cane,
+        arc=cane.arc + by,
+        nodes=tuple(Node(node.arc + by, node.pixels) for node in cane.nodes),
+        hidden=tuple(Span(span.start + by, span.end + by) for span in cane.hidden),
+    )
 
 
 def _axis_distance(first: Cane, second: Cane) -> float:
     """Median distance of two axes near their base (m)."""
-    near = second.axis[second.arc < 0.25]
+    near = second.axis[second.arc < _NEAR_BASE]
     if len(near) < 2:
         near = second.axis
     return float(np.median(cdist(near, first.axis).min(axis=1)))

@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from perception.plant.map import PlantMap
 from perception.plant.model import Cane, Node, Plant, Span, Spur
@@ -79,6 +81,53 @@ def test_a_node_that_one_look_in_three_invents_is_not_believed_and_one_that_it_m
     (spur,) = known(plant(right), plant(invented), plant(missed)).spurs
     (fused,) = spur.as_spur().canes
     assert [round(node.arc, 3) for node in fused.nodes] == [0.02, 0.10, 0.18, 0.26]
+
+
+def later(whole, start):
+    """The same cane, whose base a frame sees so much farther out (m)."""
+    keep = whole.arc >= start - 1e-9
+    nodes = tuple(Node(node.arc - start, node.pixels) for node in whole.nodes if node.arc > start)
+    hidden = tuple(Span(span.start - start, span.end - start) for span in whole.hidden)
+    return replace(whole, axis=whole.axis[keep], arc=whole.arc[keep] - start, nodes=nodes, hidden=hidden)
+
+
+@settings(max_examples=30)
+@given(st.lists(st.integers(0, 3), min_size=1, max_size=12))
+def test_nodes_are_the_same_wherever_a_frame_sees_the_base_of_their_cane(starts):
+    """Arc lengths are from the median base, and no node is counted twice."""
+    map_ = PlantMap()
+    whole = cane(nodes=(0.10, 0.18, 0.26))
+    for start in starts:
+        (told,) = map_.update(plant(later(whole, 0.01 * start)), (NUMBER,))[0].canes
+    base = 0.01 * float(np.median(starts))
+    (fused,) = map_.spurs[0].as_spur().canes
+    for each in (told, fused):
+        assert [node.arc for node in each.nodes] == pytest.approx([0.10 - base, 0.18 - base, 0.26 - base], abs=0.002)
+        places = [each.at(node.arc)[2] for node in each.nodes]
+        assert places == pytest.approx([1.05, 1.13, 1.21], abs=0.001)
+
+
+def test_a_node_that_was_hidden_counts_also_when_its_base_is_seen_elsewhere_later():
+    hides, shows = cane(nodes=(0.10, 0.26), hidden=(Span(0.16, 0.20),)), cane(nodes=(0.10, 0.18, 0.26))
+    (spur,) = known(*[plant(later(hides, 0.03))] * 3, *[plant(shows)] * 4).spurs
+    assert [round(node.arc, 2) for node in spur.canes[0].as_cane().nodes] == [0.10, 0.18, 0.26]
+
+
+def test_a_cut_stays_where_it_was_when_the_base_is_seen_elsewhere_later():
+    map_, whole = known(plant(cane())), cane()
+    assert map_.sever(np.array([0.0, 0.0, 0.95 + 0.20]))
+    for _ in range(3):
+        map_.update(plant(later(whole, 0.02)), (NUMBER,))
+    (fused,) = map_.spurs[0].as_spur().canes
+    assert fused.at(fused.length)[2] == pytest.approx(1.15, abs=0.006)
+    assert fused.length == pytest.approx(0.18, abs=0.006)
+
+
+def test_a_node_that_few_frames_show_is_not_of_the_one_that_shows_it():
+    right, invented = plant(cane()), plant(cane(nodes=(0.02, 0.10, 0.14, 0.18, 0.26)))
+    map_ = known(right, right)
+    (told,) = map_.update(invented, (NUMBER,))[0].canes
+    assert [round(node.arc, 2) for node in told.nodes] == [0.02, 0.10, 0.18, 0.26]
 
 
 def test_nodes_beyond_what_the_clearest_look_shows_are_not_put_at_its_end():
