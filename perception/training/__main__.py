@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from perception.training.export import write_network
+from perception.training.export import HELD_OUT_ROWS, write_network
 from perception.training.fit import WEIGHTS, Trainer
 from perception.training.network import Labeller
 from perception.training.scenes import TRAINING_SEED, VALIDATION_SEED, Scenes, render_scenes
@@ -54,7 +54,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     torch.save(trainer.state(), kept)
     if trainer.step < trainer.steps:
         return 0
-    held_out = _scenes(words.work / "validation.npz", VALIDATION_SEED, 6)
+    held_out = _scenes(words.work / "validation.npz", VALIDATION_SEED, HELD_OUT_ROWS)
     labeller = Labeller(trainer.network, WEIGHTS)
     scores = {depth: confusion(labeller, held_out, depth) for depth in (True, False)}
     write_network(words.out, trainer, scores[True], scores[False], widening(labeller, held_out))

@@ -90,9 +90,7 @@ class Trainer:
         self.network.train()
         while self.step < min(until, self.steps):
             images, labels = _batch(scenes, np.random.default_rng([self.seed, self.step]))
-            with torch.autocast("cpu", torch.bfloat16):
-                logits = self.network(images)
-            loss: Tensor = self._loss(logits.float(), labels)
+            loss: Tensor = self._loss(self.network(images), labels)
             self._optimiser.zero_grad()
             loss.backward()
             self._optimiser.step()

@@ -1,4 +1,7 @@
-"""Training pictures: rendered rows with more variety than any one vineyard, and their true classes."""
+"""Training pictures: rendered rows with more variety than any one vineyard, and their true classes.
+
+Half of the rows stand in the weather, with lateral organs and drooping canes, from calm up to the preset `storm`.
+"""
 
 import io
 from dataclasses import dataclass
@@ -13,11 +16,28 @@ from bridge.sim.camera.config import CameraConfig
 from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
+from bridge.sim.world.config import CALM, PRESETS, WorldConfig
+from bridge.sim.world.growth import overgrown
 
 #: Seeds of training rows begin here, those of validation rows at the second number: far from any that people use.
 TRAINING_SEED, VALIDATION_SEED = 7_000_000, 8_000_000
-#: Pictures of each row.
-VIEWS = 3
+#: Pictures of each row: a close-up, one as of the last way to a cut, two as of a survey.
+VIEWS = 4
+#: Of each of them: distance from the plane of the vines (m), SD of the turn about the camera's x, y and z axes (rad).
+_VIEWS = (
+    ((0.3, 0.6), np.radians([8.0, 12.0, 20.0])),
+    ((0.12, 0.4), np.radians([15.0, 20.0, 40.0])),
+    ((0.55, 1.1), np.radians([5.0, 6.0, 3.0])),
+    ((0.55, 1.1), np.radians([8.0, 15.0, 10.0])),
+)
+#: What disturbs the pictures, each by itself: from nothing to as much as in `storm`.
+_LIGHT, _DEPTH, _GROWTH = (
+    ("sunlight", "glare", "wet", "exposure"),
+    ("depth_lost",),
+    ("laterals", "tendrils", "leaves", "drooping"),
+)
+#: SD of the camera's speed on each axis (m/s, rad/s), which blurs its pictures.
+_SPEED = np.array([0.1, 0.1, 0.1, 0.15, 0.15, 0.15])
 _LOOKING_LEFT = np.column_stack([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 
@@ -54,22 +74,20 @@ def render_scenes(first_seed: int, rows: int) -> Scenes:
 def _row(seed: int) -> list[tuple[NDArray[np.uint8], NDArray[np.float16], NDArray[np.uint8]]]:
     rng = np.random.default_rng([seed, 21])
     config = _vineyard(rng)
-    row = grow(config, seed)
-    camera = Camera(_camera(rng), seed)
+    world = _weather(rng)
+    row = overgrown(grow(config, seed), world, seed)
+    camera = Camera(_camera(rng), seed, world)
     out = []
-    for view in range(VIEWS):
-        # Survey views from an arm's length, and close-ups; cameras are not exactly level.
-        away = rng.uniform(0.55, 1.1) if view else rng.uniform(0.3, 0.6)
+    for view, (distance, turn) in enumerate(_VIEWS):
         place = np.eye(4)
-        tilt = rng.normal(0.0, np.radians([5.0, 6.0, 3.0]))
-        place[:3, :3] = _LOOKING_LEFT @ Rotation.from_rotvec(tilt).as_matrix()
+        place[:3, :3] = _LOOKING_LEFT @ Rotation.from_rotvec(rng.normal(0.0, turn)).as_matrix()
         across = (config.vines - 1) * config.vine_spacing
         place[:3, 3] = [
             config.first_vine_x + rng.uniform(-0.8, across + 0.8),
-            config.row_distance - away,
+            config.row_distance - rng.uniform(*distance),
             config.cordon_height + rng.normal(0.1, 0.12),
         ]
-        image = camera.render(row, place, view)
+        image = camera.render(row, place, view, rng.normal(0.0, _SPEED))
         out.append((_sent(image.color, rng), image.depth.astype(np.float16), image.labels))
     return out
 
@@ -81,6 +99,18 @@ def _sent(color: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint
     data = io.BytesIO()
     Image.fromarray(color).save(data, "JPEG", quality=int(rng.integers(70, 96)))
     return np.asarray(Image.open(data), dtype=np.uint8)
+
+
+def _weather(rng: np.random.Generator) -> WorldConfig:
+    if rng.random() < 0.5:
+        return CALM
+    storm = PRESETS["storm"]
+    # The low sun comes with its glare, and growth as a whole; a share of them has none.
+    shares = {knob: float(rng.uniform()) for knobs in (_LIGHT, _DEPTH, _GROWTH) for knob in knobs}
+    for knobs in (_LIGHT, _DEPTH, _GROWTH):
+        if rng.random() < 0.25:
+            shares |= dict.fromkeys(knobs, 0.0)
+    return msgspec.structs.replace(CALM, **{knob: share * getattr(storm, knob) for knob, share in shares.items()})
 
 
 def _vineyard(rng: np.random.Generator) -> VineyardConfig:

@@ -10,6 +10,7 @@ need("training")
 
 import torch
 
+from perception.models.cards import read_model
 from perception.segmentation.network_segmenter import NetworkSegmenter, network_input
 from perception.training.compact import CompactLabeller
 from perception.training.export import write_network
@@ -18,7 +19,7 @@ from perception.training.fit import (
     Trainer,
 )
 from perception.training.network import Labeller
-from perception.training.scenes import Scenes
+from perception.training.scenes import VIEWS, Scenes, render_scenes
 from perception.training.score import (
     Confusion,
     confusion,
@@ -59,6 +60,19 @@ def test_a_training_goes_on_from_another_one_and_the_card_tells_both(scenes, tmp
     card = (tmp_path / "net.md").read_text(encoding="utf-8")
     assert "8 steps of" in card and "--seed 1 --rows 2 --steps 16 --until 6 --out net.onnx" in card
     assert "--seed 2 --rows 3 --steps 2 --start build/training/state_1_16.pt --out net.onnx" in card
+    kept = read_model(tmp_path / "net.onnx").card
+    assert kept is not None and kept.command.count("python -m perception.training --seed") == 2
+    (figures,) = kept.figures.values()
+    assert figures["cane"] == {"iou": score.overlap()["cane"], "recall": score.found()["cane"]}
+
+
+def test_pictures_of_rows_are_varied_and_always_the_same():
+    scenes, again, others = (render_scenes(seed, 2) for seed in (8_900_000, 8_900_000, 8_900_002))
+    for name in ("color", "depth", "labels"):
+        assert np.array_equal(getattr(scenes, name), getattr(again, name))
+        assert not np.array_equal(getattr(scenes, name), getattr(others, name))
+    assert len(scenes.color) == len(scenes.depth) == len(scenes.labels) == 2 * VIEWS
+    assert all((scenes.labels == WOOD_CLASSES.index(kind)).any() for kind in ("cane", "node", "cordon", "wire"))
 
 
 def test_what_was_learned_survives_the_export(scenes, tmp_path):
