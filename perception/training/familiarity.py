@@ -20,7 +20,7 @@ from onnx import helper, numpy_helper
 
 from perception.models.cards import read_model, write_card
 from perception.segmentation.network_segmenter import FAMILIAR, STRANGENESS, network_input
-from perception.training.scenes import render_scenes
+from perception.training.scenes import SURVEY_VIEWS, VIEWS, render_scenes
 from perception.training.wide.drawing import Artist
 from rolling_panda.errors import ConfigError, RollingPandaError
 
@@ -40,7 +40,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit code."""
     parser = argparse.ArgumentParser(prog="python -m perception.training.familiarity", description=__doc__)
     parser.add_argument("network", type=Path, metavar="NET.onnx", help="written anew, with its card")
-    parser.add_argument("--rows", type=int, default=60, help="rendered rows, of three pictures each")
+    parser.add_argument("--rows", type=int, default=60, help="rendered rows, of two pictures each")
     parser.add_argument("--drawings", type=int, default=0, help="drawings of the training for photographs")
     words = parser.parse_args(argv)
     if words.rows < 10 and words.drawings < 50:
@@ -59,12 +59,17 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def pictures_of(rows: int, drawings: int) -> list[NDArray[np.float32]]:
-    """Inputs of the network (each 4×H×W): of rendered rows with and without depth, and of drawings, mixed."""
+    """Inputs of the network (each 4×H×W), mixed: of rendered rows with and without depth, and of drawings.
+
+    Of the rows the pictures as of a survey: nothing else is judged.
+    """
     out = []
     if rows:
         scenes = render_scenes(_ROWS_SEED, rows)
-        for number, (color, depth) in enumerate(zip(scenes.color, scenes.depth, strict=True)):
-            out.append(network_input(color, None if number % 3 == 2 else depth.astype(np.float32)))
+        for number in range(len(scenes.color)):
+            if number % VIEWS in SURVEY_VIEWS:
+                depth = None if number % 3 == 2 else scenes.depth[number].astype(np.float32)
+                out.append(network_input(scenes.color[number], depth))
     artist = Artist(256)
     for number in range(drawings):
         drawn = artist.draw(_DRAWN_SEED, number)

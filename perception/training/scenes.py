@@ -23,6 +23,8 @@ from bridge.sim.world.growth import overgrown
 TRAINING_SEED, VALIDATION_SEED = 7_000_000, 8_000_000
 #: Pictures of each row: a close-up, one as of the last way to a cut, two as of a survey.
 VIEWS = 4
+#: Of them, those as of a survey.
+SURVEY_VIEWS = (2, 3)
 #: Of each of them: distance from the plane of the vines (m), SD of the turn about the camera's x, y and z axes (rad).
 _VIEWS = (
     ((0.3, 0.6), np.radians([8.0, 12.0, 20.0])),
