@@ -17,7 +17,14 @@ import torch
 from perception.training.export import HELD_OUT_ROWS, write_network
 from perception.training.fit import WEIGHTS, Trainer
 from perception.training.network import Labeller
-from perception.training.scenes import TRAINING_SEED, VALIDATION_SEED, Scenes, render_scenes
+from perception.training.scenes import (
+    NEAR_VIEWS,
+    SURVEY_VIEWS,
+    TRAINING_SEED,
+    VALIDATION_SEED,
+    Scenes,
+    render_scenes,
+)
 from perception.training.score import confusion, widening
 
 _TELL_EVERY, _KEEP_EVERY = 50, 250
@@ -56,8 +63,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 0
     held_out = _scenes(words.work / "validation.npz", VALIDATION_SEED, HELD_OUT_ROWS)
     labeller = Labeller(trainer.network, WEIGHTS)
-    scores = {depth: confusion(labeller, held_out, depth) for depth in (True, False)}
-    write_network(words.out, trainer, scores[True], scores[False], widening(labeller, held_out))
+    survey, near = held_out.of_views(SURVEY_VIEWS), held_out.of_views(NEAR_VIEWS)
+    scores = {
+        "survey": confusion(labeller, survey),
+        "survey without depth": confusion(labeller, survey, with_depth=False),
+        "near and turned": confusion(labeller, near),
+    }
+    write_network(words.out, trainer, scores, widening(labeller, held_out))
     print(words.out.with_suffix(".md").read_text(encoding="utf-8"))
     return 0
 

@@ -3,7 +3,7 @@
 import hashlib
 import json
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from io import BytesIO
 from pathlib import Path
 
@@ -20,19 +20,17 @@ from perception.training.score import Confusion
 from rolling_panda.messages.types import WOOD_CLASSES
 
 _OPSET = 17
-#: Rows that no training has seen, and what their pictures are called in the cards.
+#: Rows that no training has seen.
 HELD_OUT_ROWS = 12
-_HELD_OUT = f"{VIEWS * HELD_OUT_ROWS} rendered pictures"
 
 
-def write_network(path: Path, trainer: Trainer, with_depth: Confusion, without: Confusion, wider: float) -> None:
+def write_network(path: Path, trainer: Trainer, scores: Mapping[str, Confusion], wider: float) -> None:
     """Write the network and its cards.
 
     Args:
         path: ONNX file; its cards are the same name with .md and .json.
         trainer: The trained network.
-        with_depth: Its confusion matrix on held-out rows.
-        without: The same without depth.
+        scores: Its confusion matrix on held-out pictures, by what they are called.
         wider: Width bias of canes (px).
     """
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -55,7 +53,6 @@ def write_network(path: Path, trainer: Trainer, with_depth: Confusion, without: 
     onnx.helper.set_model_props(model, {"classes": json.dumps(list(WOOD_CLASSES)), "widening": f"{wider:.2f}"})
     onnx.checker.check_model(model)
     onnx.save(model, str(path))
-    overlap, found = with_depth.overlap(), with_depth.found()
     commands = _commands(path, trainer)
     write_card(
         path,
@@ -63,10 +60,10 @@ def write_network(path: Path, trainer: Trainer, with_depth: Confusion, without: 
             sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
             data=(Data(f"rendered rows, {_seeds(trainer)}; no photograph", "BSD-3-Clause", _rows(trainer) * VIEWS),),
             command=", then ".join(commands),
-            figures={_HELD_OUT: {name: {"iou": overlap[name], "recall": found[name]} for name in overlap}},
+            figures={of: _figures(score) for of, score in scores.items()},
         ),
     )
-    card = _card(path, trainer, commands, with_depth, without, wider)
+    card = _card(path, trainer, commands, scores, wider)
     path.with_suffix(".md").write_text(card, encoding="utf-8")
 
 
@@ -88,12 +85,24 @@ def _commands(path: Path, trainer: Trainer) -> list[str]:
     return told
 
 
-def _card(
-    path: Path, trainer: Trainer, commands: Sequence[str], with_depth: Confusion, without: Confusion, wider: float
-) -> str:
+def _figures(score: Confusion) -> dict[str, dict[str, float | None]]:
+    overlap, found = score.overlap(), score.found()
+    return {name: {"iou": overlap[name], "recall": found[name]} for name in overlap}
+
+
+def _table(scores: Mapping[str, Confusion]) -> str:
+    columns = {of: _figures(score) for of, score in scores.items()}
+    told = [
+        f"| {name} | "
+        + " | ".join(f"{c[name]['iou']:.3f}, {c[name]['recall']:.3f}" if name in c else "–" for c in columns.values())
+        + " |"
+        for name in WOOD_CLASSES
+    ]
+    return "\n".join([f"| class | {' | '.join(columns)} |", "|---" * (1 + len(columns)) + "|", *told])
+
+
+def _card(path: Path, trainer: Trainer, commands: Sequence[str], scores: Mapping[str, Confusion], wider: float) -> str:
     parameters, rows = sum(weight.numel() for weight in trainer.network.parameters()), _rows(trainer)
-    overlap, found, blind = with_depth.overlap(), with_depth.found(), without.overlap()
-    table = "\n".join(f"| {name} | {overlap[name]:.3f} | {found[name]:.3f} | {blind[name]:.3f} |" for name in overlap)
     steps = sum(run.until for run in trainer.runs)
     told = ", then\n  ".join(f"`{command}`" for command in commands)
     return f"""# {path.name}
@@ -111,12 +120,10 @@ Tells the class of every pixel of a picture of a vine in winter, for `perception
 - Training: {steps} steps of {BATCH} crops of {CROP}×{CROP} pixels, one thread.
 - Command: {told}.
 
-Scores on {_HELD_OUT} of {HELD_OUT_ROWS} other rows (seeds from {VALIDATION_SEED}). Overlap is intersection over
-union, found is the share of the class's pixels that were given it.
+Scores on pictures of {HELD_OUT_ROWS} other rows (seeds from {VALIDATION_SEED}): intersection over union, then
+the share of the class's pixels that were given it.
 
-| class | overlap | found | overlap without depth |
-|---|---|---|---|
-{table}
+{_table(scores)}
 
 Canes come out {wider:.2f} pixels too wide on average, which is subtracted when they are measured.
 

@@ -20,7 +20,7 @@ from onnx import helper, numpy_helper
 
 from perception.models.cards import read_model, write_card
 from perception.segmentation.network_segmenter import FAMILIAR, STRANGENESS, network_input
-from perception.training.scenes import SURVEY_VIEWS, VIEWS, render_scenes
+from perception.training.scenes import SURVEY_VIEWS, render_scenes
 from perception.training.wide.drawing import Artist
 from rolling_panda.errors import ConfigError, RollingPandaError
 
@@ -65,11 +65,9 @@ def pictures_of(rows: int, drawings: int) -> list[NDArray[np.float32]]:
     """
     out = []
     if rows:
-        scenes = render_scenes(_ROWS_SEED, rows)
-        for number in range(len(scenes.color)):
-            if number % VIEWS in SURVEY_VIEWS:
-                depth = None if number % 3 == 2 else scenes.depth[number].astype(np.float32)
-                out.append(network_input(scenes.color[number], depth))
+        scenes = render_scenes(_ROWS_SEED, rows).of_views(SURVEY_VIEWS)
+        for number, (color, depth) in enumerate(zip(scenes.color, scenes.depth, strict=True)):
+            out.append(network_input(color, None if number % 3 == 2 else depth.astype(np.float32)))
     artist = Artist(256)
     for number in range(drawings):
         drawn = artist.draw(_DRAWN_SEED, number)

@@ -4,6 +4,7 @@ Half of the rows stand in the weather, with lateral organs and drooping canes, f
 """
 
 import io
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import msgspec
@@ -23,8 +24,8 @@ from bridge.sim.world.growth import overgrown
 TRAINING_SEED, VALIDATION_SEED = 7_000_000, 8_000_000
 #: Pictures of each row: a close-up, one as of the last way to a cut, two as of a survey.
 VIEWS = 4
-#: Of them, those as of a survey.
-SURVEY_VIEWS = (2, 3)
+#: Of them, those from near, and those as of a survey.
+NEAR_VIEWS, SURVEY_VIEWS = (0, 1), (2, 3)
 #: Of each of them: distance from the plane of the vines (m), SD of the turn about the camera's x, y and z axes (rad).
 _VIEWS = (
     ((0.3, 0.6), np.radians([8.0, 12.0, 20.0])),
@@ -56,6 +57,11 @@ class Scenes:
     color: NDArray[np.uint8]
     depth: NDArray[np.float16]
     labels: NDArray[np.uint8]
+
+    def of_views(self, views: Sequence[int]) -> "Scenes":
+        """The pictures of some of the views of each row."""
+        chosen = np.isin(np.arange(len(self.color)) % VIEWS, views)
+        return Scenes(self.color[chosen], self.depth[chosen], self.labels[chosen])
 
 
 def render_scenes(first_seed: int, rows: int) -> Scenes:

@@ -56,7 +56,7 @@ def test_a_training_goes_on_from_another_one_and_the_card_tells_both(scenes, tmp
     second = Trainer(2, 2, 3, first.state())
     assert np.mean(losses(second, scenes, 2)) < np.mean(begun[:2])
     score = confusion(Labeller(second.network, WEIGHTS), scenes)
-    write_network(tmp_path / "net.onnx", second, score, score, 0.0)
+    write_network(tmp_path / "net.onnx", second, {"all": score}, 0.0)
     card = (tmp_path / "net.md").read_text(encoding="utf-8")
     assert "8 steps of" in card and "--seed 1 --rows 2 --steps 16 --until 6 --out net.onnx" in card
     assert "--seed 2 --rows 3 --steps 2 --start build/training/state_1_16.pt --out net.onnx" in card
@@ -80,7 +80,7 @@ def test_what_was_learned_survives_the_export(scenes, tmp_path):
     told = losses(trainer, scenes, 16)
     assert np.mean(told[-4:]) < 0.7 * np.mean(told[:4])
     score = confusion(Labeller(trainer.network, WEIGHTS), scenes)
-    write_network(tmp_path / "net.onnx", trainer, score, score, 0.25)
+    write_network(tmp_path / "net.onnx", trainer, {"all": score}, 0.25)
     said = NetworkSegmenter(tmp_path / "net.onnx").classify(scenes.color[0], scenes.depth[0].astype(np.float32))
     image = network_input(scenes.color[0], scenes.depth[0].astype(np.float32))
     with torch.inference_mode():
@@ -88,7 +88,10 @@ def test_what_was_learned_survives_the_export(scenes, tmp_path):
     assert len(np.unique(meant)) > 1 and np.mean(said == meant) > 0.999
     assert NetworkSegmenter(tmp_path / "net.onnx").width_bias == 0.25
     card = (tmp_path / "net.md").read_text(encoding="utf-8")
-    assert f"| cane | {score.overlap()['cane']:.3f} |" in card and "--seed 1 --rows 2 --steps 16" in card
+    assert (
+        f"| cane | {score.overlap()['cane']:.3f}, {score.found()['cane']:.3f} |" in card
+        and "--seed 1 --rows 2 --steps 16" in card
+    )
 
 
 def test_the_form_that_is_exported_says_the_same_as_the_one_that_was_trained():
