@@ -352,7 +352,9 @@ def _renew(spur: Spur, keeper: _Keeper, shorten: Cut | Reason, config: RuleConfi
     nearest, nearest_seen = (min(values) for values in zip(*found, strict=True))
     if nearest < keeper_at or nearest_seen < keeper_seen:
         return left(reasons.cane_below_keeper())
-    room = min(nearest, length) - keeper_at
+    # The topmost cane grows from below the end of the stub; one that goes on along it is seen from the end on.
+    end = length - spur.radius
+    room = min(nearest, end) - keeper_at
     shortest = min(room, min(nearest_seen, length) - keeper_seen)
     if shortest < config.min_stub:
         return left(reasons.stub_too_short(1000 * max(shortest, 0.0)))

@@ -227,9 +227,17 @@ def test_a_stub_may_be_thicker_than_a_cane_but_not_than_the_shears_take():
 
 def test_a_stub_is_cut_midway_between_where_its_canes_come_out_of_it():
     """Both are seen from the bark on: the lower one leaves at 45°, so that its axis comes out 10 mm farther down."""
-    low, high = leaving((0.010, 0.0, 0.94), np.pi / 4), cane(base=(0.0, 0.0, 0.985))
+    low, high = leaving((0.010, 0.0, 0.94), np.pi / 4), cane(base=(0.0, 0.0, 0.98))
     cut = apply_rule(spur(low, high), RULE).cuts[1]
-    assert cut.position[2] == pytest.approx((0.93 + 0.985) / 2, abs=1e-3)
+    assert cut.position[2] == pytest.approx((0.93 + 0.98) / 2, abs=1e-3)
+
+
+def test_a_cane_that_goes_on_along_its_stub_grows_from_below_the_end_of_it():
+    """The stub ends at 0.99 m and has a radius of 7 mm. What is seen of the cane begins at the end, or past it."""
+    low = leaving((0.010, 0.0, 0.94), np.pi / 4)
+    for seen_from in (0.99, 1.0, 1.02):
+        (_, renewal) = apply_rule(spur(low, cane(base=(0.0, 0.0, seen_from))), RULE).cuts
+        assert renewal.position[2] == pytest.approx((0.93 + 0.983) / 2, abs=0.001)
 
 
 def test_a_cane_below_the_keeper_is_left_for_a_person():
