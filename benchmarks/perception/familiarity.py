@@ -127,9 +127,9 @@ def _compare(
     vines: dict[str, list[Picture]],
 ) -> dict[str, dict[str, Any]]:
     """Of each score: areas under the ROC curve, and the shares above its limit by kind."""
-    from perception.training.scenes import render_scenes
+    from perception.training.scenes import SURVEY_VIEWS, render_scenes
 
-    scenes = render_scenes(_TRAINING_SEED, _TRAINING_ROWS)
+    scenes = render_scenes(_TRAINING_SEED, _TRAINING_ROWS).of_views(SURVEY_VIEWS)
     training = [
         # As in training, a third is without depth.
         probe.read(color, None if number % 3 == 2 else depth.astype(np.float32))
