@@ -23,8 +23,8 @@ _SAME_CANE = 0.015
 _NEAR_BASE, _ALIGNED = 0.25, 5
 #: Nodes nearer than this along a cane are one (m).
 _SAME_NODE = 0.018
-#: A node counts if at least this share of the frames that show its place show it. A cut past a node that is none loses
-#: one that stays; past one too many it can be made again.
+#: A node counts if at least this share of the frames that show its place show it. A false node makes the cut one node
+#: too low, which cannot be undone; a missed one makes it one too high.
 _MIN_SHARE = 0.6
 #: Observations that a mean covers.
 _WINDOW = 20

@@ -125,7 +125,7 @@ the share of the class's pixels that were given it.
 
 {_table(scores)}
 
-Canes come out {wider:.2f} pixels too wide on average, which is subtracted when they are measured.
+Canes are drawn {wider:+.2f} pixels wider than they are in the mean. This is subtracted when they are measured.
 
 Limits: all that it has seen was rendered. Weeds, snow, people and machines were not in it. It has not been scored on
 photographs.

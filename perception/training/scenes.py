@@ -113,7 +113,7 @@ def _weather(rng: np.random.Generator) -> WorldConfig:
     if rng.random() < 0.5:
         return CALM
     storm = PRESETS["storm"]
-    # The low sun comes with its glare, and growth as a whole; a share of them has none.
+    # Light, lost depth and growth are each absent from a quarter of these rows.
     shares = {knob: float(rng.uniform()) for knobs in (_LIGHT, _DEPTH, _GROWTH) for knob in knobs}
     for knobs in (_LIGHT, _DEPTH, _GROWTH):
         if rng.random() < 0.25:

@@ -160,7 +160,7 @@ def test_a_network_says_how_much_too_wide_it_draws_canes(tmp_path):
         for text in ("0.4", None)
     ]
     assert said == [0.4, 0.0]
-    assert abs(choose_segmenter("network").width_bias) < 1.0 and choose_segmenter("labels").width_bias == 0.0
+    assert abs(choose_segmenter("network").width_bias) < 0.2 and choose_segmenter("labels").width_bias == 0.0
 
 
 def test_each_picture_is_for_the_network_that_knows_such_pictures():
