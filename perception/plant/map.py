@@ -117,7 +117,7 @@ class KnownCane:
         """Add an observation; returns it with arc lengths from the base of all."""
         offset = self._offset(cane)
         self.bases.append(offset)
-        cane = _shifted(cane, offset - self._move_base(round(float(np.median(self.bases)) / _STRETCH)))
+        cane = cane.shifted(offset - self._move_base(round(float(np.median(self.bases)) / _STRETCH)))
         self.radius.add(np.array([cane.radius]))
         self.radii.append(cane.radius)
         self.shown += _shown(cane)
@@ -154,7 +154,7 @@ class KnownCane:
         """Measure from another base, so many stretches farther out; returns how far that is (m)."""
         by = stretches * _STRETCH
         if stretches:
-            self.best, self.cut_at = _shifted(self.best, -by), self.cut_at - by
+            self.best, self.cut_at = self.best.shifted(-by), self.cut_at - by
             for node in self.nodes:
                 node.estimate.mean = node.estimate.mean - by
             self.bases = deque((base - by for base in self.bases), maxlen=_WINDOW)
@@ -356,16 +356,6 @@ def _associate(spur: KnownSpur, cane: Cane) -> Cane:
         return same.with_other_views(same.add(cane))
     spur.canes.append(KnownCane.of(cane, len(spur.canes)))
     return spur.canes[-1].with_other_views(cane)
-
-
-def _shifted(cane: Cane, by: float) -> Cane:
-    """The same cane with arc lengths from another place."""
-    return replace(
-        cane,
-        arc=cane.arc + by,
-        nodes=tuple(Node(node.arc + by, node.pixels) for node in cane.nodes),
-        hidden=tuple(Span(span.start + by, span.end + by) for span in cane.hidden),
-    )
 
 
 def _axis_distance(first: Cane, second: Cane) -> float:

@@ -1,6 +1,6 @@
 """Plant model of one frame: spurs and their canes, with visible and hidden stretches."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -82,6 +82,15 @@ class Cane:
         """Point on the axis at an arc length (3, m, odom); the ends are held."""
         point: Array = interpolate(np.array([arc]), self.arc, self.axis)[0]
         return point
+
+    def shifted(self, by: float) -> "Cane":
+        """The same cane with all arc lengths larger by so much (m)."""
+        return replace(
+            self,
+            arc=self.arc + by,
+            nodes=tuple(Node(node.arc + by, node.pixels) for node in self.nodes),
+            hidden=tuple(Span(span.start + by, span.end + by) for span in self.hidden),
+        )
 
     def tangent(self, arc: float) -> Array:
         """Unit vector along the axis, away from the base, from the chord over 1 cm to either side."""

@@ -98,15 +98,8 @@ def _cane(line: Centreline, reverse: bool, gap: float) -> Cane:
         axis, end, arc = axis[::-1], line.ends[0], length - arc[::-1]
     radius = base_radius(line, reverse)
     start = max(0.0, gap - radius)
-    return Cane(
-        axis=axis,
-        arc=arc + start,
-        radius=radius,
-        nodes=tuple(Node(node.arc + start, node.pixels) for node in nodes),
-        hidden=tuple(Span(span.start + start, span.end + start) for span in hidden),
-        end=end,
-        base_gap=start,
-    )
+    cane = Cane(axis, arc, radius, tuple(nodes), tuple(hidden), end, base_gap=start)
+    return cane.shifted(start)
 
 
 def _clouds(
