@@ -2957,6 +2957,11 @@ def cut_where_seen(point: str, distance_mm: float) -> None:
     """{point} is cut {distance_mm:.0f} mm from where it was accepted: the close-up sees the same cane there."""
 
 
+@_reason("info", "")
+def cut_where_room(point: str, distance_mm: float) -> None:
+    """{point} is cut {distance_mm:.0f} mm along the wood, where the blades have room: the same nodes stay."""
+
+
 # Planning
 
 

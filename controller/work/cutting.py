@@ -237,12 +237,13 @@ class Parts:
         if math.dist(robot.kinematics.T_odom_tool.translation, cut_at) > self.config.work.close_up_from:
             self.post_cut_check.request_close_up(self.cut_point, cut_at, now)
 
-    def refine(self, point_id: str, motion: ToolMotion, frame: MapFrame) -> None:
+    def refine(self, task: "CutTask", motion: ToolMotion, frame: MapFrame) -> None:
         """Correct a motion to the newest, more accurate position of its point."""
-        ticket = self.queue.get(point_id)
+        ticket = self.queue.get(task.point_id)
         if ticket is None:
             return
-        _shift(motion, frame.position_in_odom(np.array(ticket.point.position)))
+        place = np.array(ticket.point.position) + task.planned.along * np.array(ticket.point.tangent)
+        _shift(motion, frame.position_in_odom(place))
 
     def brake(self, robot: Measured, pause: m.Reason | None = None) -> StepResult:
         """Come to rest, or stay there; with a reason the work pauses."""
@@ -601,7 +602,7 @@ class Travel(MovingStage):
             return self, parts.brake(robot, parts.ending)
         self._follow_drift(robot)
         if not config.work.pre_cut_check:
-            parts.refine(self.point_id, motion, robot.frame)
+            parts.refine(self._task, motion, robot.frame)
         parts.look_back(robot, now)
         tracking = self._way.track(robot)
         result = StepResult(tracking.xi, tracking)
@@ -646,8 +647,8 @@ class CloseUp(MovingStage):
 class Fitting(MovingStage):
     """Check the way in to where the close-up has seen the cut. The tool is still clear of the canes.
 
-    The newest map counts. Where the planned approach has no room, another one is taken, and a close-up from there
-    checks again. Without one the cut is put off.
+    The newest map counts. Where the planned approach has no room there or beside it on the same wood, another one is
+    taken, and a close-up from there checks again. Without one the cut is put off.
     """
 
     phase: m.Phase = "CLOSE_UP"
@@ -678,7 +679,7 @@ class Fitting(MovingStage):
         if fitted is None:
             tracking = self._way.track(robot)
             return self, StepResult(tracking.xi, tracking)
-        if fitted.plan is not None and fitted.lacking is None:
+        if fitted.plan is not None and fitted.plan.approach == self._task.planned.approach:
             return self._enter(robot, fitted.plan)
         if np.any(robot.sent):
             # Another motion begins at rest.
@@ -698,8 +699,8 @@ class Fitting(MovingStage):
         """Straight in, to where the cut was seen."""
         parts, motion, accepted = self._parts, self._way.motion, self._task.accepted
         motion.extend(replace(parts.segments.into(self._task.plan), q_goal=plan.q_cut))
-        _shift(motion, self._seen)
-        parts.servo.begin(self.point_id, motion.goal)
+        _shift(motion, self._task.frame.position_in_odom(plan.poses.cut.translation))
+        parts.servo.begin(self.point_id, self._seen, motion.goal.rotation)
         self._way.timeout.start(motion.duration)
         tracking = self._way.track(robot)
         result = StepResult(tracking.xi, tracking)
@@ -707,6 +708,8 @@ class Fitting(MovingStage):
         moved = 0.0 if known is None else math.dist(self._seen, known)
         if moved > TOLD_MOVED:
             result = result.with_event(reasons.cut_where_seen(self.point_id, 1e3 * moved))
+        if plan.along:
+            result = result.with_event(reasons.cut_where_room(self.point_id, 1e3 * abs(plan.along)))
         return Advance(parts, replace(self._task, planned=plan), self._way), result
 
     def _turn(self, robot: Measured, fitted: Fitted) -> Step:
@@ -755,7 +758,7 @@ class Advance(MovingStage):
         if config.work.pre_cut_check:
             parts.servo.correct(motion, robot)
         else:
-            parts.refine(self.point_id, motion, robot.frame)
+            parts.refine(self._task, motion, robot.frame)
         tracking = self._way.track(robot)
         result = StepResult(tracking.xi, tracking)
         there = timeout.over(tracking, now, config.work.position_tolerance, config.work.rotation_tolerance)

@@ -149,6 +149,8 @@ APPROACHES: tuple[Approach, ...] = (
 TILTS = (0.0, 0.2, 0.26, -0.26)
 #: Where none of these has room: turns, tilts and leans in all combinations, the smallest first. On a stub the blades
 #: lean more, as a person's shears do, to pass the cane that stays.
+#: Places of a cut along its wood in order of preference (m), as far as its point allows them.
+_ALONG = (0.0, 0.0025, -0.0025, 0.005, -0.005, 0.007)
 _TURNS, _TILTS, _LEANS, _STUB_LEANS = (0.0, 0.35, 0.7), (0.0, 0.13, 0.26), (0.0, 0.13, 0.26), (0.0, 0.15, 0.3, 0.44)
 #: An approach that differs from a tried one by this is another one (rad), and room beside a cane that was met which is
 #: enough (m): how far canes lean and swing, and what the map may err.
@@ -183,6 +185,11 @@ def approaches(azimuth: float | None, kind: CutKind) -> tuple[Approach, ...]:
     return usual + tuple(each for each in more if each not in usual)
 
 
+def places(point: PruningPoint) -> tuple[float, ...]:
+    """Where a cut may be made along its wood (m past the point), the point itself first."""
+    return tuple(along for along in _ALONG if -point.inward <= along <= point.outward)
+
+
 def _both(sizes: tuple[float, ...]) -> tuple[float, ...]:
     return tuple(sorted({sign * size for size in sizes for sign in (1.0, -1.0)}))
 
@@ -199,6 +206,7 @@ class CutPlan:
         joint_margin: Smallest distance to a joint limit along the approach (rad).
         manipulability: Smallest ω of the arm along the approach.
         approach: From where it is.
+        along: How far past the point the cut is made, along its tangent (m), as there is no room at the point.
     """
 
     poses: CutPoses
@@ -208,6 +216,7 @@ class CutPlan:
     joint_margin: float
     manipulability: float
     approach: Approach = (0.0, 0.0, 0.0)
+    along: float = 0.0
 
     def in_odom(self, frame: MapFrame) -> "CutPlan":
         """The plan in odom of one in map."""
@@ -231,7 +240,7 @@ class Fitted:
 
     Attributes:
         plan: The plan; None where no approach has room.
-        lacking: What the planned approach lacks there; None where it is taken.
+        lacking: What the planned cut lacks there; None where it is taken.
     """
 
     plan: CutPlan | None
@@ -281,8 +290,28 @@ class PostureSearch:
             azimuth: Turn of the approach about the cane (rad) set by a person; None leaves it to the search.
             tried: Failed tries: another approach is found, with room beside the canes that were met.
         """
-        position, tangent = np.array(point.position), np.array(point.tangent)
         passed_over: list[tuple[float, Reason]] = []
+        for along in places(point):
+            found = yield from self._find_at(along, point, q, azimuth, tried, passed_over)
+            if found is not None:
+                return found
+            # Another place helps where something is in the way, not where the arm does not get there.
+            if not passed_over:
+                return Unreachable(self._beyond(np.array(point.position), q))
+        return Unreachable(reasons.no_clear_posture(min(passed_over, key=lambda each: each[0])[1]))
+
+    def _find_at(
+        self,
+        along: float,
+        point: PruningPoint,
+        q: Array,
+        azimuth: float | None,
+        tried: Sequence[Tried],
+        passed_over: list[tuple[float, Reason]],
+    ) -> Generator[None, None, CutPlan | Unreachable | None]:
+        """The same at one place; None without a plan there. Adds what was too near to `passed_over`."""
+        tangent = np.array(point.tangent)
+        position = np.array(point.position) + along * tangent
         usual = len(APPROACHES if azimuth is None else TILTS)
         wanted = approaches(azimuth, point.kind)
         if tried:
@@ -310,13 +339,11 @@ class PostureSearch:
                 continue
             # A good posture with the straight approach is preferred to a better one from the side.
             if (plan := (yield from self._best(poses, approach, q, passed_over))) is not None:
-                return plan
+                return replace(plan, along=along)
         for _, approach, poses in sorted(tight, key=lambda each: -each[0]):
             if (plan := (yield from self._best(poses, approach, q, passed_over))) is not None:
-                return plan
-        if passed_over:
-            return Unreachable(reasons.no_clear_posture(min(passed_over, key=lambda each: each[0])[1]))
-        return Unreachable(self._beyond(position, q))
+                return replace(plan, along=along)
+        return None
 
     def fit(
         self,
@@ -329,9 +356,9 @@ class PostureSearch:
     ) -> Generator[None, None, "Fitted"]:
         """The plan of a cut where a close-up has seen it, with the base where the plan has it.
 
-        The planned approach is taken where it has room there, else the one nearest to it that has. The errors of map
-        and arm often shift all wood alike. So no cane that stays may be between the closing blades where the cut is
-        seen, nor where it is in the map.
+        The planned approach is taken where it has room there, or beside it along the wood, else the one nearest to it
+        that has. The errors of map and arm often shift all wood alike. So no cane that stays may be between the
+        closing blades where the cut is seen, nor where it is in the map.
 
         Args:
             plan: The plan.
@@ -345,18 +372,21 @@ class PostureSearch:
         in_map = known + tangent * float((seen - known) @ tangent)
         lacking: Reason | None = None
         left = _FITS
-        for approach in self._nearest(plan.approach, point, azimuth, tried) if others else (plan.approach,):
+        wanted = self._nearest(plan.approach, point, azimuth, tried) if others else [plan.approach]
+        beside = sorted(places(point), key=lambda each: abs(each - plan.along))
+        for approach, along in product(wanted, beside):
             spare = approach != plan.approach
-            poses = self._poses(seen, tangent, approach)
+            shift = along * tangent
+            poses = self._poses(seen + shift, tangent, approach)
             why = self._clearance.tool_too_near(poses, point, spare)[1]
-            why = why or self._clearance.bitten(self._poses(in_map, tangent, approach).cut, point)[1]
+            why = why or self._clearance.bitten(self._poses(in_map + shift, tangent, approach).cut, point)[1]
             yield
             if why is None:
                 left -= 1
                 found = yield from self._try(poses, plan.q_stand_off, plan.q_stand_off[ARM_Q])
                 why = self._beyond(seen, plan.q_cut) if found is None else self._clearance.too_near(found, spare)[1]
                 if found is not None and why is None:
-                    return Fitted(replace(found, approach=approach), lacking)
+                    return Fitted(replace(found, approach=approach, along=along), lacking)
                 yield
             lacking = lacking or why
             if left == 0:

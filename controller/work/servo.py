@@ -10,10 +10,8 @@ pictures, and with those that tell nothing or come late, the motion stays as it 
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from controller.config import WorkConfig
 from controller.motion.follower import Measured
@@ -50,26 +48,27 @@ class CutServo:
         self._config = config
         self.end()
 
-    def begin(self, point_id: str, goal: Any) -> None:
+    def begin(self, point_id: str, place: Array, rotation: Array) -> None:
         """Follow a point.
 
         Args:
             point_id: The point.
-            goal: T_odom_tool (pin.SE3) at the cut, where the close-up has seen it.
+            place: Where the close-up has seen it (3, m, odom).
+            rotation: Of the tool at the cut (3×3, odom).
         """
         self.point_id = point_id if self._config.servo else ""
-        self._goal, self._across = goal.translation.copy(), goal.rotation[:, [0, 2]].copy()
+        self._place, self._across = place.copy(), rotation[:, [0, 2]].copy()
         self._aside, self._variance, self._made = np.zeros(2), np.full(2, _BEFORE**2), np.zeros(2)
         self._asked: dict[int, _Asked] = {}
         self._away, self._speed, self._next = 0.0, 0.0, -math.inf
 
     def carry(self, by: Array) -> None:
         """The cut is elsewhere in odom (by, 3, m), as the base rolls over uneven ground."""
-        self._goal = self._goal + by
+        self._place = self._place + by
 
     def end(self) -> None:
         """Follow nothing."""
-        self.begin("", pin.SE3.Identity())
+        self.begin("", np.zeros(3), np.eye(3))
 
     def due(self, now: float) -> bool:
         """Whether to ask for the next picture."""
@@ -87,7 +86,7 @@ class CutServo:
             return
         if now - asked.at > self._config.servo_max_age_s:
             return
-        seen = (np.array(sight.position) - self._goal) @ self._across
+        seen = (np.array(sight.position) - self._place) @ self._across
         if float(np.linalg.norm(seen - self._aside)) > self._config.servo_jump:
             return
         xx, xy, xz, yy, yz, zz = sight.covariance

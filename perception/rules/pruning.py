@@ -9,6 +9,7 @@ Nothing is extrapolated: nodes that were not seen are not counted.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
@@ -32,6 +33,11 @@ CUTTING_STRENGTH = 9.34e6
 _VISIBLE_HALF_WIDTH = 0.008
 #: Confidence of a renewal cut beside a cane whose own cut is undecided: never one that is accepted unseen.
 _DOUBTFUL = 0.5
+#: Where the blades have no room, a cane may be cut so much nearer to the last kept node than the best place, or so much
+#: farther out (m): with the usual offset, and what is known of a cut's place, still 10 to 30 mm past the node.
+_INWARD, _OUTWARD = 0.005, 0.007
+#: Spacing of places that are looked at for that (m).
+_PLACE_STEP = 0.001
 #: Turns, tilts and leans of the blades in a renewal cut, as shares of the largest.
 _SHARES = (0.0, 0.5, -0.5, 1.0, -1.0)
 #: Places of a renewal cut between the cane that stays and the next one, by shares of the way, in order of preference.
@@ -60,6 +66,8 @@ class Cut:
         offset: Distance past the last kept node along the wood (m); None where no node is below the cut.
         node_distance: Distance to the nearest kept node (m); None where none is known.
         cane: Number of the cane on its spur, of a renewal cut that of the cane that stays; -1 where it has none.
+        inward: By how much nearer to the cordon the cut may be made, where the blades have no room (m).
+        outward: The same farther from the cordon.
     """
 
     kind: CutKind
@@ -73,6 +81,8 @@ class Cut:
     offset: float | None = None
     node_distance: float | None = None
     cane: int = -1
+    inward: float = 0.0
+    outward: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -260,19 +270,31 @@ def clear_arc(cane: Cane, arc: float, others: list[Array], config: RuleConfig, k
     for fraction in (0.0, 0.5, -0.5, 1.0, -1.0):
         place = arc + fraction * config.max_shift
         position = cane.at(place)
-        if any(abs(node.arc - place) < config.node_distance for node in cane.nodes):
+        if _beside_node(cane, place, config):
             continue
-        if any(
-            len(axis) and np.linalg.norm(axis - position, axis=1).min() < config.crossing_distance for axis in others
-        ):
-            reason: Reason | None = reasons.cane_crosses_cut()
-        else:
-            reason = keep_out.reason(position)
+        reason = _obstructed(position, others, config, keep_out)
         if reason is None and keep_out.fits(position, cane.tangent(place)):
             return place
         tight = place if tight is None and reason is None else tight
         first_reason = first_reason or reason
     return tight or first_reason or reasons.blades_without_place()
+
+
+def _beside_node(cane: Cane, arc: float, config: RuleConfig) -> bool:
+    return any(abs(node.arc - arc) < config.node_distance for node in cane.nodes)
+
+
+def _obstructed(position: Array, others: list[Array], config: RuleConfig, keep_out: KeepOut) -> Reason | None:
+    """Why no cut is made at a position (3, m, odom): another cane or a keep-out zone; None where it may be."""
+    if any(len(axis) and np.linalg.norm(axis - position, axis=1).min() < config.crossing_distance for axis in others):
+        return reasons.cane_crosses_cut()
+    return keep_out.reason(position)
+
+
+def _free(most: float, allowed: Callable[[float], bool]) -> float:
+    """How far a cut may be shifted, up to `most` (m), over places that are all `allowed`."""
+    shifts = np.arange(1, max(round(most / _PLACE_STEP), 0) + 1) * _PLACE_STEP
+    return next((shift - _PLACE_STEP for shift in shifts.tolist() if not allowed(shift)), max(most, 0.0))
 
 
 def too_thick(radius: float, config: RuleConfig) -> bool:
@@ -294,6 +316,14 @@ def _shorten(
         return reasons.cane_beyond_shears(2000 * cane.radius)
     nodes = count_nodes(cane, config)
     last = nodes[kept - 1].arc
+
+    def allowed(place: float) -> bool:
+        hidden = any(span.overlaps(place - _VISIBLE_HALF_WIDTH, place + _VISIBLE_HALF_WIDTH) for span in cane.hidden)
+        beyond_end = not last < place < cane.length - _VISIBLE_HALF_WIDTH
+        if hidden or beyond_end or _beside_node(cane, place, config):
+            return False
+        return _obstructed(cane.at(place), others, config, keep_out) is None
+
     return Cut(
         kind="cane cut" if fruiting else "spur cut",
         position=cane.at(arc),
@@ -306,6 +336,8 @@ def _shorten(
         offset=arc - last,
         node_distance=node_distance(cane, nodes[:kept], cane.at(arc)),
         cane=cane.number,
+        inward=_free(arc - (best - _INWARD), lambda shift: allowed(arc - shift)),
+        outward=_free(best + _OUTWARD - arc, lambda shift: allowed(arc + shift)),
     )
 
 
@@ -369,6 +401,7 @@ def _renew(spur: Spur, keeper: _Keeper, shorten: Cut | Reason, config: RuleConfi
         return left(reasons.shears_touch_keeper())
     if (reason := keep_out.reason(position)) is not None:
         return left(reason)
+    farthest = keeper_at + _STUB_SHARES[-1] * room - float((position - root) @ along)
     if 2 * spur.radius > config.max_stub_diameter:
         return left(reasons.stub_beyond_shears(2000 * spur.radius))
     return Cut(
@@ -382,6 +415,7 @@ def _renew(spur: Spur, keeper: _Keeper, shorten: Cut | Reason, config: RuleConfi
         reason=reasons.renewal_cut(len(others)),
         node_distance=node_distance(keeper.cane, keeper.cane.nodes, position),
         cane=keeper.cane.number,
+        outward=_free(farthest, lambda shift: keep_out.reason(position + shift * along) is None),
     )
 
 

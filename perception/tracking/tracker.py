@@ -371,6 +371,8 @@ class Tracker:
             force=cutting_force(float(track.radius)),
             node_distance=cut.node_distance,
             cane=cut.cane,
+            inward=cut.inward,
+            outward=cut.outward,
         )
         if old is not None:
             same = self._same_cut(old, point)

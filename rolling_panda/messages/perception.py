@@ -59,6 +59,9 @@ class PruningPoint(Struct, frozen=True, forbid_unknown_fields=True):
         cordon_distance: The same for cordons.
         node_distance: Distance to the nearest node that stays (m); None if none is known.
         digest: Hash of the revision's place and kind, see `point_digest`.
+        inward: By how much nearer to the cordon the same cut may be made, where it has no room (m): on the same wood,
+            with the same nodes left.
+        outward: The same farther from the cordon.
     """
 
     point_id: Name
@@ -82,6 +85,8 @@ class PruningPoint(Struct, frozen=True, forbid_unknown_fields=True):
     node_distance: NonNegative | None = None
     digest: Digest = ""
     cane: Annotated[int, Meta(ge=-1, le=100000)] = -1
+    inward: NonNegative = 0.0
+    outward: NonNegative = 0.0
 
 
 class PruningRule(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -47,12 +47,12 @@ class SeesElsewhere(KinematicRobot):
         return msgspec.structs.replace(seen, position=vector3(np.add(seen.position, self.off)))
 
 
-def work(monkeypatch, *obstacles, off=(0.0, 0.0, 0.0), news=()):
+def work(monkeypatch, *obstacles, off=(0.0, 0.0, 0.0), news=(), **room):
     """Makes the cut; the robot, and how deep the tool came in (m, y) before each approach was given up."""
     monkeypatch.setattr("tests.support.controller_at_work.KinematicRobot", SeesElsewhere)
     monkeypatch.setattr(SeesElsewhere, "off", off)
     monkeypatch.setattr(SeesElsewhere, "news", news)
-    cut = point("a", CUT, vine=1, spur=1, cane=0)
+    cut = point("a", CUT, vine=1, spur=1, cane=0, **room)
     r, deepest = working((cut,), obstacles=(OWN, *obstacles)), -1.0
     run_until(r, lambda s: s is not None and s.mode == "AUTO", 2.0)
     while r.state.mode == "AUTO":
@@ -87,6 +87,18 @@ def test_a_cut_that_is_seen_nearer_to_a_wire_is_approached_another_way_and_looke
     assert entry(r, "a").state == "DONE", text_of(entry(r, "a").reason)
     assert len(turned(r)) == 1 and r.cuts[0][1][2, 2] > straight.cuts[0][1][2, 2] + 0.1, "from below"
     assert r.cuts[0][1][:3, 3] == pytest.approx(np.add(CUT, (0.0, 0.0, 0.014)), abs=0.002)
+
+
+def test_a_cut_that_is_seen_beside_a_wire_is_made_a_little_along_the_wood_and_told(monkeypatch):
+    """The wire becomes known with the picture."""
+    off = (0.004, 0.0, 0.002)
+    seen = np.add(CUT, off)
+    r, _ = work(monkeypatch, off=off, news=(wire(seen[2] + 0.0115),), inward=0.005)
+    assert entry(r, "a").state == "DONE", text_of(entry(r, "a").reason)
+    assert not turned(r)
+    along = r.cuts[0][1][:3, 3] - seen
+    assert along[:2] == pytest.approx([0.0, 0.0], abs=0.001) and -0.006 < along[2] < -0.0015
+    assert any("along the wood" in text for text in r.events)
 
 
 def test_nothing_moves_into_a_cut_that_has_no_room_where_it_is_seen(monkeypatch):

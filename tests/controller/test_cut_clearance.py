@@ -33,13 +33,13 @@ def among(capsules, standing=()):
     return PostureSearch(RobotModel(), CONFIG.work, CONFIG.whole_body.joint_margin, clearance)
 
 
-def find(*capsules, tangent=(0.0, 0.1, 1.0), azimuth=None, kind="spur cut", cane=0, tried=(), standing=()):
-    """A plan for the point, on spur 1 of vine 1, among these and the axes of all standing canes."""
+def find(*capsules, tangent=(0.0, 0.1, 1.0), azimuth=None, kind="spur cut", cane=0, tried=(), standing=(), **room):
+    """A plan for the point, on spur 1 of vine 1, among these and the axes of all standing canes; `room` along it."""
     q = np.zeros(12)
     q[ARM_Q] = CONFIG.work.home
     search = among(capsules, standing)
     along = tuple((np.array(tangent) / np.linalg.norm(tangent)).tolist())
-    cut = point("p1", tuple(POINT.tolist()), along, vine=1, spur=1, cane=cane, kind=kind)
+    cut = point("p1", tuple(POINT.tolist()), along, vine=1, spur=1, cane=cane, kind=kind, **room)
     return completed(search.find(cut, q, azimuth, tried))
 
 
@@ -250,6 +250,35 @@ def test_a_wire_in_the_way_from_everywhere_is_said_to_be():
     plan = find(wire(POINT[2]))
     assert isinstance(plan, Unreachable)
     assert plan.reason.code == "no_clear_posture" and plan.reason.values[0][1].values[0] == ("place", "at the cut")
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_beside_a_wire_the_cut_is_made_elsewhere_on_the_same_wood_as_far_as_it_may_be(side):
+    level = wire(POINT[2] + 0.0135 * side, POINT[1])
+    away, towards = ("inward", "outward") if side > 0.0 else ("outward", "inward")
+    plan = find(level, tangent=(0.0, 0.0, 1.0), **{away: 0.005, towards: 0.007})
+    assert isinstance(plan, CutPlan)
+    assert -0.005 <= plan.along * side < 0.0
+    np.testing.assert_allclose(plan.poses.cut.translation, POINT + [0.0, 0.0, plan.along])
+    for room in ({}, {towards: 0.007}, {away: 0.002}):
+        assert isinstance(find(level, tangent=(0.0, 0.0, 1.0), **room), Unreachable)
+
+
+def test_a_cut_with_room_is_made_at_its_point():
+    plan = find(wire(1.2), inward=0.005, outward=0.007)
+    assert isinstance(plan, CutPlan) and plan.along == 0.0
+    np.testing.assert_allclose(plan.poses.cut.translation, POINT)
+
+
+def test_where_a_wire_is_seen_beside_the_cut_the_same_approach_is_kept_a_little_along_the_wood():
+    upright = (0.0, 0.0, 1.0)
+    plan, level = find(tangent=upright), wire(POINT[2] + 0.0135, POINT[1])
+    cut = point("p1", tuple(POINT.tolist()), upright, vine=1, spur=1, cane=0, inward=0.005)
+    for others in (True, False):
+        fitted = completed(among((level,)).fit(plan, cut, POINT, others=others))
+        assert fitted.plan.approach == plan.approach and -0.005 <= fitted.plan.along < 0.0
+        assert dict(fitted.lacking.values)["part"] == "blades"
+        np.testing.assert_allclose(fitted.plan.poses.cut.translation, POINT + [0.0, 0.0, fitted.plan.along])
 
 
 def test_what_is_far_away_changes_nothing():

@@ -182,6 +182,32 @@ def wire_from(low, high):
     return KeepOut(lambda place: WIRE if low < place[2] < high else None, lambda place, tangent: True)
 
 
+def room_of(*canes, **around):
+    """How far the spur cut may be made before its place and past it (mm)."""
+    cut = apply_rule(spur(*canes), RULE, **around).cuts[0]
+    return pytest.approx((1000 * cut.inward, 1000 * cut.outward), abs=0.1)
+
+
+def test_where_the_blades_have_no_room_the_cut_may_be_made_a_little_nearer_or_farther_out():
+    assert room_of(cane()) == (5.0, 7.0)
+    # A node 32.5 mm past the last kept one: the cut is midway, and stays 10 mm from both.
+    assert room_of(cane(nodes=(0.02, 0.10, 0.18, 0.2125))) == (5.0, 6.0)
+    assert room_of(cane(hidden=(Span(0.212, 0.26),))) == (5.0, 4.0)
+    assert room_of(cane(nodes=(0.02, 0.10, 0.18), length=0.212, end="hidden")) == (5.0, 3.0)
+    assert room_of(cane(), keep_out=wire_from(1.2035, 1.3)) == (5.0, 3.0)
+    crossing = np.array([[0.1 * k - 0.5, 0.0, 1.182] for k in range(11)])
+    assert room_of(cane(), other_canes=crossing) == (3.0, 7.0)
+    # Where the cut has been shifted inwards by 8.5 mm already, it is not shifted farther, but back.
+    assert room_of(cane(), keep_out=wire_from(1.194, 1.209)) == (0.0, 2.0)
+
+
+def test_a_stub_may_be_cut_farther_out_but_not_near_the_next_cane():
+    low, high = leaving((0.010, 0.0, 0.94), np.pi / 4), cane(base=(0.0, 0.0, 0.98))
+    cut = apply_rule(spur(low, high), RULE).cuts[1]
+    assert cut.inward == 0.0
+    assert cut.position[2] + cut.outward == pytest.approx(0.93 + 0.8 * 0.05, abs=0.0015)
+
+
 def test_blades_keep_10_mm_from_the_nodes():
     # Midway between nodes 30 mm apart; a cane crosses there, and to either side a node is too near.
     tight = cane(nodes=(0.02, 0.10, 0.18, 0.212))

@@ -153,6 +153,10 @@ export interface PruningPoint {
   digest: string;
   /** Number of the cane on that spur, as perceived; of a renewal cut that of the cane that stays. It names the same cane for as long as perception runs; -1 if unknown. */
   cane: number;
+  /** By how much nearer to the cordon the same cut may be made, where it has no room (m): on the same wood, with the same nodes left. */
+  inward: number;
+  /** The same farther from the cordon. */
+  outward: number;
 }
 
 /** A pruning point in the controller's queue. */
