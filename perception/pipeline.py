@@ -279,8 +279,8 @@ class Perception:
         except UnusablePictureError as error:
             return failed_check(frame, error.reason)
         self._follower.begin(check, point.kind == "renewal cut")
-        if check.position is not None and check.tangent is not None:
-            self._tracker.refine(point.point_id, np.array(check.position), np.array(check.tangent))
+        if check.position is not None:
+            self._tracker.refine(point.point_id, np.array(check.position))
         return self.row_frame.check_in_odom(check)
 
     def see_cut(self, frame: CameraFrame) -> CutSight:

@@ -42,13 +42,48 @@ class Inertial:
 
     Attributes:
         at: On the sensors' own clock (s).
-        rate: Angular velocity (3, rad/s).
+        rate: Angular velocity (3, rad/s), the mean since the sample before.
         force: Specific force (3, m/s²): at rest, `GRAVITY` upwards.
     """
 
     at: float
     rate: Array
     force: Array
+
+
+class _Felt:
+    """What the sensors have measured over some samples."""
+
+    def __init__(self, last: Inertial | None = None) -> None:
+        """Nothing since the `last` sample."""
+        self._last = last
+        #: Rotation of the camera (3×3), with the gyroscope's bias, over a time (s).
+        self.turning: Array = np.eye(3)
+        self.span = 0.0
+        #: A sample is missing, or no number.
+        self.broken = False
+        self._forces: Array = np.zeros(3)
+
+    @property
+    def force(self) -> Array:
+        """Mean specific force (3, m/s²)."""
+        return self._forces / self.span
+
+    def anew(self) -> "_Felt":
+        """Nothing since the newest sample."""
+        return _Felt(self._last)
+
+    def add(self, sample: Inertial | None) -> None:
+        """Take in a sample; one that is told again changes nothing."""
+        last, self._last = self._last, sample
+        if sample is None or not (np.isfinite(sample.rate).all() and np.isfinite(sample.force).all()):
+            self._last, self.broken = None, True
+        elif last is None or not 0.0 <= sample.at - last.at < _GAP_S:
+            self.broken = True
+        elif (passed := sample.at - last.at) > 0.0:
+            self.turning = self.turning @ pin.exp3(sample.rate * passed)
+            self._forces = self._forces + sample.force * passed
+            self.span += passed
 
 
 class BaseOrientation:
@@ -66,7 +101,9 @@ class BaseOrientation:
         #: Whether it is measured now; else roll and pitch are what they were.
         self.measured = False
         self._q = np.zeros(3 + NXI)
-        self._last: tuple[Inertial, Array] | None = None
+        self._felt = _Felt()
+        #: R_base_hand where samples were taken in last; None after a gap.
+        self._hand: Array | None = None
         self._measured_at = -math.inf
         self._rolled_at: float | None = None
         #: Turn by the wheels since the last sample (rad).
@@ -80,8 +117,17 @@ class BaseOrientation:
         self._has_moved = False
         self._mount = _MountEstimate()
 
+    def feel(self, sample: Inertial | None) -> None:
+        """Take in a sample of sensors that are read more often than `update` is called.
+
+        What shakes the hand faster than that is then not taken for a turn of the base.
+        """
+        self._felt.add(sample)
+
     def update(self, sample: Inertial | None, position: Array, velocity: Array, turned: float, now: float) -> Array:
-        """Take in a sample; without a valid one, and before the bias is known, the base turns as its wheels say.
+        """Take in the samples since the last call; without valid ones the base turns as its wheels say.
+
+        So it does before the bias is known.
 
         Args:
             sample: The newest; None where there is none.
@@ -93,6 +139,7 @@ class BaseOrientation:
         Returns:
             R_odom_base (3×3).
         """
+        self._felt.add(sample)
         speed = np.abs(velocity)
         if self._rolled_at is None:
             self._rolled_at = self._moved_at = now
@@ -102,12 +149,12 @@ class BaseOrientation:
         if not speed[:2].max() <= _STANDS:
             self._rolled_at = now
         self._turned += turned if math.isfinite(turned) else 0.0
-        if sample is None or not all(np.isfinite(each).all() for each in (sample.rate, sample.force, position)):
-            self._last = None
+        if self._felt.broken or not np.isfinite(position).all():
+            self._hand, self._felt = None, self._felt.anew()
             self._mount.leave()
             self._by_wheels()
-        elif self._last is None or sample.at != self._last[0].at:
-            self._integrate(sample, position, now)
+        elif self._felt.span > 0.0:
+            self._integrate(position, now)
             self._turned = 0.0
         self.measured = now - self._measured_at < _LOST_S
         return self.R
@@ -116,25 +163,25 @@ class BaseOrientation:
         self.R = self.R @ pin.exp3(np.array([0.0, 0.0, self._turned]))
         self._turned = 0.0
 
-    def _integrate(self, sample: Inertial, position: Array, now: float) -> None:
+    def _integrate(self, position: Array, now: float) -> None:
         self._q[3:] = position
         hand: Array = self._model.pose(self._q, self._model.camera_id).rotation.copy()
-        last, self._last = self._last, (sample, hand)
-        passed = math.inf if last is None else sample.at - last[0].at
-        if last is None or not 0.0 < passed < _GAP_S:
+        before, self._hand = self._hand, hand
+        felt, self._felt = self._felt, self._felt.anew()
+        if before is None:
             self._mount.leave()
             self._by_wheels()
             return
         assert self._rolled_at is not None
         stands, parked = now - self._moved_at >= _STANDS_S, now - self._rolled_at >= _STANDS_S
+        turn = pin.log3(felt.turning)
         if stands:
-            self._learn_bias(sample.rate, passed)
+            self._learn_bias(turn / felt.span, felt.span)
         if self._stood < _KNOWN_S:
             self._by_wheels()
             return
         self._measured_at = now
-        before = last[1]
-        turning = pin.exp3((0.5 * (last[0].rate + sample.rate) - self._bias) * passed)
+        turning = pin.exp3(turn - self._bias * felt.span)
         if parked:
             # Slower than the gyroscope's noise it may still creep.
             self._by_wheels()
@@ -143,11 +190,11 @@ class BaseOrientation:
             self._mount.leave()
             on_hand = self._mount.R
             self.R = self.R @ before @ on_hand @ turning @ on_hand.T @ hand.T
-        force = hand @ self._mount.R @ sample.force
+        force = hand @ self._mount.R @ felt.force
         if not self._has_moved:
             self._up = self._up + self.R @ force
         elif stands or not parked:
-            self._to_gravity(force, passed / (_GRAVITY_S if stands else _MOVING_GRAVITY_S))
+            self._to_gravity(force, felt.span / (_GRAVITY_S if stands else _MOVING_GRAVITY_S))
 
     def _learn_bias(self, rate: Array, passed: float) -> None:
         self._stood += passed

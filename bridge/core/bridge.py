@@ -287,6 +287,7 @@ class BridgeCore:
         real = self._calibration.commanded(xi)
         self.robot.write(Setpoint(real, blades, self._fence.epoch, self._validator.sequence, self._clock, releases))
         self._measured = self._calibration.measured(self.robot.read())
+        self._odometer.feel(self._measured)
         self._ticks += 1
         self._follow_cut()
         if (used := self._calibration.kept(not xi.any())) is not None:

@@ -64,6 +64,11 @@ class Odometer:
         """How the base stands on the ground; None without an orientation."""
         return self._attitude
 
+    def feel(self, measured: Measurement) -> None:
+        """Take in the inertial sensors of a measurement that is not followed."""
+        if self._orientation is not None:
+            self._orientation.feel(measured.inertial)
+
     def follow(self, measured: Measurement, now: float) -> None:
         """Integrate up to a measurement at a time (s); the first one is the origin's."""
         wheels = measured.position[:2]

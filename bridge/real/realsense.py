@@ -1,7 +1,9 @@
 """The RealSense camera on the hand: pictures on demand, from a thread that reads the stream, and inertial samples."""
 
+import math
 import threading
 import time
+from collections import deque
 from dataclasses import replace
 from typing import Any, Protocol
 
@@ -15,8 +17,8 @@ from rolling_panda.messages.robot import Intrinsics
 from rolling_panda.model.differential_drive import Array
 
 _WAIT_MS = 1000
-#: Samples of the inertial sensors come every 5 ms; older than this they tell nothing of now (s).
-_FRESH_S = 0.05
+#: Samples of the inertial sensors come every 5 ms; older than this they tell nothing of now (s). So many are kept.
+_FRESH_S, _MOST = 0.05, 40
 
 
 class Frames(Protocol):
@@ -27,6 +29,10 @@ class Frames(Protocol):
 
     def close(self) -> None:
         """Stop the stream."""
+
+
+#: A sample of one sensor: when it came, its time (s) and values (3).
+Sample = tuple[float, float, Array]
 
 
 class Motion(Protocol):
@@ -40,11 +46,13 @@ class Motion(Protocol):
 
 
 class MotionSamples:
-    """The newest sample of each sensor; librealsense's threads call it with each."""
+    """Samples of each sensor since they were read last; librealsense's threads call it with each."""
 
     def __init__(self) -> None:
         """None yet."""
-        self._newest: dict[str, tuple[float, float, Array]] = {}
+        self._came = {name: deque[Sample](maxlen=_MOST) for name in ("gyro", "accel")}
+        self._told: Inertial | None = None
+        self._told_at = -math.inf
 
     def __call__(self, frame: Any) -> None:
         """Take in a frame."""
@@ -52,16 +60,21 @@ class MotionSamples:
             return
         told = frame.as_motion_frame().get_motion_data()
         values, at = np.array([told.x, told.y, told.z]), 1e-3 * float(frame.get_timestamp())
-        self._newest[frame.get_profile().stream_type().name] = time.monotonic(), at, values
+        self._came[frame.get_profile().stream_type().name].append((time.monotonic(), at, values))
 
     def newest(self) -> Inertial | None:
-        """As of `Motion`."""
-        gyroscope, accelerometer = self._newest.get("gyro"), self._newest.get("accel")
-        if gyroscope is None or accelerometer is None:
-            return None
-        if time.monotonic() - min(gyroscope[0], accelerometer[0]) > _FRESH_S:
-            return None
-        return Inertial(gyroscope[1], gyroscope[2], accelerometer[2])
+        """As of `Motion`: the means of the samples since it was called last."""
+        gyroscope, accelerometer = self._came["gyro"], self._came["accel"]
+        if gyroscope and accelerometer:
+            (turned, at, rate), (felt, _, force) = _mean(gyroscope), _mean(accelerometer)
+            self._told, self._told_at = Inertial(at, rate, force), min(turned, felt)
+        return self._told if time.monotonic() - self._told_at <= _FRESH_S else None
+
+
+def _mean(came: deque[Sample]) -> Sample:
+    """The mean of the values of samples, which it takes away, with the times of the last one."""
+    samples = [came.popleft() for _ in range(len(came))]
+    return *samples[-1][:2], np.mean([values for _, _, values in samples], axis=0)
 
 
 class RealSense:

@@ -124,6 +124,8 @@ class RowLocaliser:
         self._pose: Array = np.zeros(6)
         self._covariance: Array = np.diag([1e-6, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6])
         self._odom: Array | None = None
+        #: Pose in odom up to which the way has been counted.
+        self._counted: Array = np.zeros(3)
         self._stamp = -np.inf
         self._way = 0.0
         self._since_fix = 0.0
@@ -164,6 +166,7 @@ class RowLocaliser:
         self._late = stamp < self._stamp - _ORDER
         if self._odom is None:
             self._odom, self._stamp = base.copy(), stamp
+            self._counted = base.copy()
             self._pose[[X, Y, RZ]] = base
             return self.estimate
         moved, passed = base - self._odom, stamp - self._stamp
@@ -225,6 +228,7 @@ class RowLocaliser:
     def _anew(self, base: Array, stamp: float, cause: Cause) -> Estimate:
         """The same place in the map at another pose in odom."""
         self._odom, self._stamp = base.copy(), stamp
+        self._counted = base.copy()
         self._covariance = self._covariance + _DOUBT
         return self._lost(cause)
 
@@ -249,13 +253,14 @@ class RowLocaliser:
         c, s = np.cos(self._pose[RZ] - self._odom[2]), np.sin(self._pose[RZ] - self._odom[2])
         dx, dy = base[:2] - self._odom[:2]
         step, turned = np.array([c * dx - s * dy, s * dx + c * dy]), float(base[2] - self._odom[2])
-        way = float(np.hypot(dx, dy))
-        rolled = way + abs(turned) * _HALF_TRACK
+        way = float(np.hypot(*(base - self._counted)[:2]))
+        rolled = way + abs(float(base[2] - self._counted[2])) * _HALF_TRACK
         if rolled < _RESTS:
-            # Noise of the odometry at rest is no way.
+            # Noise of the odometry at rest is no way; what creeps away is.
             self._pose[[X, Y]] += step
             self._pose[RZ] += turned
             return
+        self._counted = base.copy()
         self._at_rest = 0
         self._way += way
         F = np.eye(6)

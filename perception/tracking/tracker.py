@@ -258,17 +258,18 @@ class Tracker:
         """The newest message of a point that is or was published; None if there was none."""
         return next((p for p in self.points() if p.point_id == point_id), None) or self._withdrawn.get(point_id)
 
-    def refine(self, point_id: str, position: Array, tangent: Array) -> None:
-        """Replace the mean of a published point by a close-up measurement, with the weight of the whole window.
+    def refine(self, point_id: str, position: Array) -> None:
+        """Replace the mean place of a published point by that of a close-up, with the weight of the whole window.
+
+        Its direction stays: the mean of many pictures is better than that of one, of a short stub above all.
 
         Args:
             point_id: Of the point; others are ignored.
             position: On the axis (3, m, odom).
-            tangent: Unit vector along the cane (3, odom).
         """
         for track in self._tracks:
             if track.point_id == point_id and track.published is not None:
-                track.position, track.tangent = position, tangent
+                track.position = position
                 track.hits, track.misses, track.gone = max(track.hits, self._config.averaging_window), 0, 0
                 track.published = self._message(track)
 

@@ -97,6 +97,12 @@ def test_the_newest_of_both_inertial_sensors_is_told_while_it_is_fresh(device: S
     motion.feel(Inertial(1.005, np.array([0.4, 0.0, 0.0]), np.array([0.0, -9.8, 0.0])))
     newer = camera.inertial()
     assert newer is not None and newer.rate == pytest.approx([0.4, 0.0, 0.0])
+    for k in range(1, 5):
+        motion.feel(Inertial(1.005 + 0.005 * k, np.array([0.1 + (-1.0) ** k, 0.0, 0.0]), np.array([0.0, -9.8, 0.0])))
+    shaken = camera.inertial()
+    assert shaken is not None and shaken.at == pytest.approx(1.025)
+    assert shaken.rate == pytest.approx([0.1, 0.0, 0.0]), "what shakes does not turn"
+    assert camera.inertial() is shaken
     time.sleep(0.1)
     assert camera.inertial() is None, "a camera that has fallen silent does not go on turning"
     camera.close()

@@ -251,3 +251,15 @@ def test_what_inertial_sensors_leave_of_height_and_tilt_adds_up_and_what_the_gro
         spread[inertial] = np.array(variances)
     ground, sensors = (each[40] / each[10] for each in (spread[False], spread[True]))
     assert np.all(ground < 1.1) and np.all(sensors > 2.0)
+
+
+def test_a_base_that_creeps_is_located_again():
+    """Between two frames it moves less than the noise of the odometry at rest."""
+    drive = Drive(vines(3), 3, slip=0.1)
+    for _ in range(5):
+        drive.look()
+    drive.go(0.3, step=0.002)
+    off = placement(drive.true).inverse() * drive.localiser.estimate.T_map_base
+    assert drive.odom[0] - drive.true[0] > 0.025
+    wood = np.array([AHEAD, ROW, 1.0])
+    assert np.linalg.norm(off.act(wood) - wood) < 0.010

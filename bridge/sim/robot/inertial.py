@@ -1,19 +1,27 @@
-"""The camera's gyroscope and accelerometer: MuJoCo's, with bias and noise."""
+"""The camera's gyroscope and accelerometer, with bias and noise.
+
+Real ones filter what is faster than their samples, such as blades that rub on wood. So a sample has the turn since the
+one before and the mean of the force.
+"""
 
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 from bridge.core.attitude import Inertial
 from rolling_panda.model.differential_drive import Array
 
-GYROSCOPE, ACCELEROMETER = "gyroscope", "accelerometer"
+#: MuJoCo's sensor.
+ACCELEROMETER = "accelerometer"
 #: Bias (SD, rad/s and m/s²) after the vendor's calibration: estimates. Bosch's BMI055 alone has up to 0.017 and 0.7.
 _RATE_BIAS, _FORCE_BIAS = 0.005, 0.05
 #: Scale of each axis of the gyroscope (SD): an estimate; the BMI055 alone has up to 0.01.
 _RATE_SCALE = 0.003
-#: White noise of the BMI055 (rad/s and m/s², SD): 0.014 °/s and 150 µg per root of a hertz, at 100 Hz.
-_RATE_NOISE, _FORCE_NOISE = 0.0024, 0.015
+#: White noise of the BMI055 (rad/s and m/s², SD): 0.014 °/s and 150 µg per root of a hertz, at 200 Hz.
+_RATE_NOISE, _FORCE_NOISE = 0.0034, 0.021
+#: Time between two samples (s).
+_SAMPLE_S = 0.005
 
 
 class InertialSensors:
@@ -33,9 +41,27 @@ class InertialSensors:
         self._bias = scale * self._random.standard_normal(6)
         self._scale = 1.0 + errors * _RATE_SCALE * self._random.standard_normal(3)
         self._noise = errors * np.repeat([_RATE_NOISE, _FORCE_NOISE], 3)
+        self._force, self._steps = np.zeros(3), 0
+        #: Time and rotation R_world_site of the last sample.
+        self._last: tuple[float, Array] | None = None
+        #: The newest sample; None before the second one.
+        self.newest: Inertial | None = None
 
-    def sample(self, data: Any) -> Inertial:
-        """What they measure now; `data` is MuJoCo's."""
-        off = self._bias + self._noise * self._random.standard_normal(6)
-        rate, force = data.sensor(GYROSCOPE).data, data.sensor(ACCELEROMETER).data
-        return Inertial(float(data.time), self._scale * (self._R @ rate) + off[:3], self._R @ force + off[3:])
+    def follow(self, data: Any) -> None:
+        """Take in a physics step; `data` is MuJoCo's."""
+        self._force = self._force + data.sensor(ACCELEROMETER).data
+        self._steps += 1
+
+    def due(self, time: float) -> bool:
+        """Whether there is a new sample at a time (s)."""
+        return self._steps > 0 and (self._last is None or time - self._last[0] > _SAMPLE_S - 1e-6)
+
+    def sample(self, time: float, R_world_site: Array) -> None:
+        """Take a sample."""
+        last = self._last
+        self._last, force = (time, R_world_site.copy()), self._force / self._steps
+        self._force, self._steps = np.zeros(3), 0
+        if last is not None:
+            rate = pin.log3(last[1].T @ R_world_site) / (time - last[0])
+            off = self._bias + self._noise * self._random.standard_normal(6)
+            self.newest = Inertial(time, self._scale * (self._R @ rate) + off[:3], self._R @ force + off[3:])

@@ -19,7 +19,7 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
-from bridge.sim.robot.inertial import ACCELEROMETER, GYROSCOPE
+from bridge.sim.robot.inertial import ACCELEROMETER
 from bridge.sim.vineyard.row import Row
 from bridge.sim.world.errors import Errors
 from rolling_panda.errors import ModelError
@@ -121,9 +121,8 @@ def build_plant(row: Row, errors: Errors | None = None, uneven: bool = False, in
     for frame in ("tool", "camera"):
         _add_site(bodies, robot, frame)
     if inertial:
-        kinds = mujoco.mjtSensor
-        for name, kind in ((GYROSCOPE, kinds.mjSENS_GYRO), (ACCELEROMETER, kinds.mjSENS_ACCELEROMETER)):
-            spec.add_sensor(name=name, type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname="camera")
+        kind, site = mujoco.mjtSensor.mjSENS_ACCELEROMETER, mujoco.mjtObj.mjOBJ_SITE
+        spec.add_sensor(name=ACCELEROMETER, type=kind, objtype=site, objname="camera")
     try:
         model = spec.compile()
     except ValueError as error:

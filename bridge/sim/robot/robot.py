@@ -18,6 +18,7 @@ import mujoco
 import numpy as np
 
 from bridge.config import BridgeConfig
+from bridge.core.attitude import Inertial
 from bridge.core.interface import Measurement, Setpoint
 from bridge.core.picture import Picture
 from bridge.sim.camera.render_process import CameraRenderer
@@ -135,6 +136,7 @@ class SimulatedRobot:
         self._start_arm = np.array(config.start_arm) - self._offset
         self._plant = build_plant(row, errors, uneven, config.inertial)
         self._inertial = InertialSensors(world.inertial_errors, errors.hand_eye, seed) if config.inertial else None
+        self._placed = mujoco.MjData(self._plant.model)
         self._levelled: Array | None = None
         self._planes, self._wheels = np.array(self._plant.ground, int).reshape(-1, 2).T
         self._ground = Ground(world, float(errors.slope[1]), seed)
@@ -186,7 +188,7 @@ class SimulatedRobot:
             cutter.detail,
             emergency=self.emergency,
             external_torque=self._felt.value.copy(),
-            inertial=None if self._inertial is None else self._inertial.sample(data),
+            inertial=self._inertial_sample(),
         )
 
     def write(self, setpoint: Setpoint) -> None:
@@ -315,6 +317,8 @@ class SimulatedRobot:
         data.qfrc_applied[plant.arm_v] += data.qfrc_bias[plant.arm_v]
         mujoco.mj_step(plant.model, data)
         self._felt.step(data, self._M, pushed)
+        if self._inertial is not None:
+            self._inertial.follow(data)
         if slip is not None:
             slip.roll(data.qvel[plant.xi_v[:2]] * STEP_S)
 
@@ -371,6 +375,21 @@ class SimulatedRobot:
         T[:3, :3] = self._data.site_xmat[site].reshape(3, 3)
         T[:3, 3] = self._data.site_xpos[site]
         return T
+
+    def _inertial_sample(self) -> Inertial | None:
+        """The newest sample of the camera's sensors; None without them."""
+        sensors = self._inertial
+        if sensors is None:
+            return None
+        if sensors.due(self.time):
+            sensors.sample(self.time, self._camera_rotation())
+        return sensors.newest
+
+    def _camera_rotation(self) -> Array:
+        """R_world_camera (3×3) at the joint positions of now, as the encoders have them: sites are one step behind."""
+        self._placed.qpos[:] = self._data.qpos
+        mujoco.mj_kinematics(self._plant.model, self._placed)
+        return np.array(self._placed.site_xmat[self._plant.camera]).reshape(3, 3)
 
     def _contacts(self) -> tuple[int, int]:
         """Numbers of contacts with the row and of self-contacts."""
