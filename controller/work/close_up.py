@@ -236,6 +236,11 @@ def not_as_accepted(close_up: CloseUpResult, ticket: Ticket | None) -> Reason | 
     return None
 
 
+def undecided(close_up: CloseUpResult) -> bool:
+    """Whether pictures came and do not tell, so that those from another side may."""
+    return close_up.finding == "unseen" and (close_up.reason is None or close_up.reason.code != "no_close_up")
+
+
 def _why(close_up: CloseUpResult) -> Reason:
     return close_up.reason or reasons.unexplained()
 

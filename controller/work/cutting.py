@@ -25,7 +25,7 @@ from controller.whole_body.saturation import Saturation
 from controller.work.back_off import BackOff, Trail
 from controller.work.base_views import BaseViews
 from controller.work.camera_views import CameraViews, Refusal
-from controller.work.close_up import CloseUpClient, PostCutCheck, camera_ready, not_as_accepted
+from controller.work.close_up import CloseUpClient, PostCutCheck, camera_ready, not_as_accepted, undecided
 from controller.work.homing import Withdrawal
 from controller.work.point_queue import TOLD_MOVED, PointQueue
 from controller.work.posture_search import (
@@ -572,6 +572,13 @@ class MovingStage(TaskStage):
         plan, motion = self._task.plan, self._way.motion
         motion.shift(plan.poses.clear.translation - before.poses.clear.translation, (plan.q_clear - before.q_clear)[:2])
 
+    def _another_time(self, robot: Measured, why: m.Reason) -> Step:
+        """Leave the cut for a try from another side, after the others. The tool is still clear of the canes."""
+        parts, tried = self._parts, Tried(self._task.planned.approach)
+        told = parts.queue.put_off(self.point_id, tried, reasons.missed_once(why), why)
+        parts.next_cut.forget()
+        return Escape(parts), parts.brake(robot).with_event(told)
+
     def _retreat(self, robot: Measured) -> "Retreat":
         """Straight out of the canes, and on to the next cut where one is found."""
         parts, following = self._parts, self._parts.next_cut
@@ -638,6 +645,8 @@ class CloseUp(MovingStage):
         parts.close_ups.forget(self.point_id)
         ticket = parts.queue.get(self.point_id)
         if why := not_as_accepted(close_up, ticket):
+            if undecided(close_up) and not parts.queue.last_try(self.point_id):
+                return self._another_time(robot, why)
             parts.queue.void(self.point_id, why)
             # The next period leaves it.
             return self, result
@@ -716,10 +725,7 @@ class Fitting(MovingStage):
         """Another way to where the cut was seen, else none."""
         parts, task, why = self._parts, self._task, fitted.lacking or reasons.unexplained()
         if fitted.plan is None:
-            none = reasons.no_room_where_seen(why)
-            told = parts.queue.put_off(self.point_id, Tried(task.planned.approach), reasons.missed_once(none), none)
-            parts.next_cut.forget()
-            return Escape(parts), parts.brake(robot).with_event(told)
+            return self._another_time(robot, reasons.no_room_where_seen(why))
         task = replace(task, planned=fitted.plan, turned=True)
         legs = parts.segments.to(task.plan, robot.kinematics.T_odom_tool, robot.q)
         way = FollowedMotion(parts, robot, *legs, to_cut=True)

@@ -385,12 +385,17 @@ class PointQueue:
         Returns:
             What is logged.
         """
+        last = self.last_try(point_id)
         self.tries.put(point_id, (*self.tries.of(point_id), tried))
-        if len(self.tries.of(point_id)) >= self._most_tries:
+        if last:
             return self.give_up(point_id, why)
         self.again(point_id, again)
         self.sort()
         return reasons.cut_ended(point_id, again)
+
+    def last_try(self, point_id: str) -> bool:
+        """Whether a cut is not tried again where the present try comes to nothing."""
+        return len(self.tries.of(point_id)) + 1 >= self._most_tries
 
     def give_up(self, point_id: str, why: Reason) -> Reason:
         """ACCEPTED → FAILED_NOT_CUT, without another try. Returns the line of the log."""

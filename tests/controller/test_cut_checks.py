@@ -176,6 +176,34 @@ def test_a_point_that_the_close_up_shows_changed_is_not_cut_says_why_and_the_wor
     assert entry(r, "b").state == "DONE"
 
 
+@pytest.mark.parametrize("hidden", [1, 2, 9])
+def test_what_close_ups_do_not_show_is_looked_at_from_other_sides_and_then_left(hidden):
+    """The other cut is made in between. The third side is the last one."""
+    r = working((point("a", (0.5, 0.75, 1.0)), point("b", (0.8, 0.75, 1.05))))
+    usual, sides = r.close_up, []
+
+    def again():
+        return sum("a: The close-up did not show it" in event for event in r.events)
+
+    def partly(request):
+        found = usual(request)
+        if request.point_id != "a" or found.finding != "seen":
+            return found
+        if len(sides) <= again():
+            sides.append(r.model.kinematics(r.q).T_odom_tool.rotation[:, 2])
+        return found if again() >= hidden else msgspec.structs.replace(found, finding="unseen", position=None)
+
+    r.close_up = partly
+    finish(r, 90.0)
+    assert again() == min(hidden, 2) and len(sides) == min(hidden + 1, 3)
+    assert all(one @ other < 0.9995 for k, one in enumerate(sides) for other in sides[:k])
+    assert [cut[0] for cut in r.cuts] == (["b", "a"] if hidden < 3 else ["b"])
+    ended = entry(r, "a")
+    assert (ended.state, ended.reason.code) == (
+        ("DONE", "cut_and_gone") if hidden < 3 else ("PROPOSED", "acceptance_void")
+    )
+
+
 @pytest.mark.parametrize(("dx", "told"), [(0.004, False), (0.02, True)])
 def test_the_place_of_the_close_up_is_cut_and_the_log_says_how_far_it_is_from_the_accepted_one(dx, told):
     r = looking(working((point("a", (0.5, 0.75, 1.0)),)), dx=dx)
