@@ -291,13 +291,18 @@ class PostureSearch:
             tried: Failed tries: another approach is found, with room beside the canes that were met.
         """
         passed_over: list[tuple[float, Reason]] = []
+        narrow: list[tuple[float, float, Approach, CutPoses]] = []
         for along in places(point):
-            found = yield from self._find_at(along, point, q, azimuth, tried, passed_over)
+            found = yield from self._find_at(along, point, q, azimuth, tried, passed_over, narrow)
             if found is not None:
                 return found
             # Another place helps where something is in the way, not where the arm does not get there.
             if not passed_over:
                 return Unreachable(self._beyond(np.array(point.position), q))
+        # Better slowly past something than not at all.
+        for _, along, approach, poses in sorted(narrow, key=lambda each: each[0]):
+            if (plan := (yield from self._best(poses, approach, q, passed_over, spare=False))) is not None:
+                return replace(plan, along=along)
         return Unreachable(reasons.no_clear_posture(min(passed_over, key=lambda each: each[0])[1]))
 
     def _find_at(
@@ -308,8 +313,13 @@ class PostureSearch:
         azimuth: float | None,
         tried: Sequence[Tried],
         passed_over: list[tuple[float, Reason]],
+        narrow: list[tuple[float, float, Approach, CutPoses]],
     ) -> Generator[None, None, CutPlan | Unreachable | None]:
-        """The same at one place; None without a plan there. Adds what was too near to `passed_over`."""
+        """The same at one place; None without a plan there.
+
+        What was too near is added to `passed_over`, and ways of the tool that lack only what a plan has to spare to
+        `narrow`.
+        """
         tangent = np.array(point.tangent)
         position = np.array(point.position) + along * tangent
         usual = len(APPROACHES if azimuth is None else TILTS)
@@ -330,6 +340,8 @@ class PostureSearch:
             lacking, nearest = self._clearance.tool_too_near(poses, point)
             if nearest is not None:
                 passed_over.append((lacking, nearest))
+                if lacking <= _SPARE and self._clearance.tool_too_near(poses, point, spare=False)[1] is None:
+                    narrow.append((lacking, along, approach, poses))
                 yield
                 continue
             yield
@@ -405,7 +417,7 @@ class PostureSearch:
         return [planned, *sorted(others, key=lambda each: (math.dist(each, planned), each))]
 
     def _best(
-        self, poses: CutPoses, approach: Approach, q: Array, passed_over: list[tuple[float, Reason]]
+        self, poses: CutPoses, approach: Approach, q: Array, passed_over: list[tuple[float, Reason]], spare: bool = True
     ) -> Generator[None, None, CutPlan | None]:
         """The first good plan with an approach, else the best one; adds what was too near to `passed_over`."""
         config, position = self._config, poses.cut.translation
@@ -422,7 +434,7 @@ class PostureSearch:
                 if plan is None:
                     continue
                 plan = replace(plan, approach=approach)
-                lacking, nearest = self._clearance.too_near(plan)
+                lacking, nearest = self._clearance.too_near(plan, spare)
                 if nearest is not None:
                     passed_over.append((lacking, nearest))
                     continue
@@ -527,6 +539,7 @@ CLEARANCE = 0.02
 #: Margin above the smallest distance of the guard (m): close to it the robot is very slow. Just before the way in less
 #: is enough, as nothing changes any more.
 _ROOM, _LEAST_ROOM = 0.003, 0.001
+_SPARE = _ROOM - _LEAST_ROOM
 #: Axes of canes (m).
 Polylines = tuple[tuple[Vector3, ...], ...]
 #: Canes this near to a cut may be beside the tool on its way in (m).

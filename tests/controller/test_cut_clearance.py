@@ -43,13 +43,18 @@ def find(*capsules, tangent=(0.0, 0.1, 1.0), azimuth=None, kind="spur cut", cane
     return completed(search.find(cut, q, azimuth, tried))
 
 
-def nearest(plan, capsule):
-    """Distance of the cutter's body to a rod at the cut (m)."""
+def nearest(plan, capsule, part="cutter"):
+    """Distance of the cutter's body, or of another part, to a rod at the cut (m)."""
     model = CollisionModel(RobotModel())
     radius = capsule.start_radius
     model.set_obstacles([Obstacle("rod", capsule.kind, capsule.start, capsule.end, radius)])
     near = model.distances(plan.q_cut, 0.2)
-    return min(d for d, pair in zip(near.distance, near.pairs, strict=True) if "rod" in pair and pair[0] == "cutter")
+    return min(d for d, pair in zip(near.distance, near.pairs, strict=True) if "rod" in pair and pair[0] == part)
+
+
+def blades(plan, capsule):
+    """Distance of the blades to a rod at the cut (m)."""
+    return nearest(plan, capsule, "blades")
 
 
 def test_a_wire_over_the_cut_is_passed_from_below():
@@ -262,6 +267,18 @@ def test_beside_a_wire_the_cut_is_made_elsewhere_on_the_same_wood_as_far_as_it_m
     np.testing.assert_allclose(plan.poses.cut.translation, POINT + [0.0, 0.0, plan.along])
     for room in ({}, {towards: 0.007}, {away: 0.002}):
         assert isinstance(find(level, tangent=(0.0, 0.0, 1.0), **room), Unreachable)
+
+
+def test_past_a_wire_that_leaves_less_than_a_plan_has_to_spare_the_cut_is_made_all_the_same():
+    """Control keeps 4 mm, and is slow from 5 mm on; a plan keeps 7 mm wherever there are."""
+    level = wire(POINT[2] + 0.016, POINT[1])
+    tight = find(level, tangent=(0.0, 0.0, 1.0))
+    assert isinstance(tight, CutPlan) and tight.along == 0.0
+    assert SETTINGS.blade_distance < blades(tight, level) < SETTINGS.blade_distance + 0.003
+    spacious = find(level, tangent=(0.0, 0.0, 1.0), inward=0.005)
+    assert isinstance(spacious, CutPlan) and spacious.along < 0.0
+    assert blades(spacious, level) > SETTINGS.blade_distance + 0.0024
+    assert isinstance(find(wire(POINT[2] + 0.014, POINT[1]), tangent=(0.0, 0.0, 1.0)), Unreachable)
 
 
 def test_a_cut_with_room_is_made_at_its_point():
