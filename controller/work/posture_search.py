@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from itertools import pairwise, product
+from itertools import chain, pairwise, product
 from typing import Any
 
 import numpy as np
@@ -386,11 +386,15 @@ class PostureSearch:
         left = _FITS
         wanted = self._nearest(plan.approach, point, azimuth, tried) if others else [plan.approach]
         beside = sorted(places(point), key=lambda each: abs(each - plan.along))
-        for approach, along in product(wanted, beside):
-            spare = approach != plan.approach
+        usual = [(approach, along, approach != plan.approach) for approach, along in product(wanted, beside)]
+        # Other approaches that lack only what a plan has to spare, after those that lack nothing.
+        narrow: list[tuple[Approach, float, bool]] = []
+        for approach, along, spare in chain(usual, narrow):
             shift = along * tangent
             poses = self._poses(seen + shift, tangent, approach)
-            why = self._clearance.tool_too_near(poses, point, spare)[1]
+            lack, why = self._clearance.tool_too_near(poses, point, spare)
+            if spare and 0.0 < lack <= _SPARE:
+                narrow.append((approach, along, False))
             why = why or self._clearance.bitten(self._poses(in_map + shift, tangent, approach).cut, point)[1]
             yield
             if why is None:
