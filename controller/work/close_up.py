@@ -147,7 +147,8 @@ class PostCutCheck:
         """
         self._queue, self._close_ups, self._check = queue, close_ups, check
         self._ended: dict[str, _Ended] = {}
-        self._tried: dict[str, PruningPoint | None] = {}
+        #: Points that a first bite seemed to leave: as accepted, and whether the cutter told of a cut.
+        self._tried: dict[str, tuple[PruningPoint | None, bool]] = {}
 
     @property
     def pending(self) -> bool:
@@ -182,6 +183,17 @@ class PostCutCheck:
                 said.append(self._settle(point_id, ended, close_up.finding, _why(close_up), aside))
         return said
 
+    def is_off(self, point_id: str) -> Reason | None:
+        """A close-up before a second bite shows the cane off: it is cut, if the cutter said so after the first one.
+
+        Returns:
+            What is logged; None where there was no such bite.
+        """
+        ticket, (accepted, cut) = self._queue.get(point_id), self._tried.get(point_id, (None, False))
+        if not cut or ticket is None or accepted is None or ticket.accepted is not accepted:
+            return None
+        return self._end(point_id, "DONE", reasons.cut_and_gone())
+
     def _settle(self, point_id: str, ended: _Ended, finding: Finding, why: Reason, aside: float = 0.0) -> Reason:
         del self._ended[point_id]
         self._close_ups.forget(point_id)
@@ -198,8 +210,8 @@ class PostCutCheck:
             return self._end(point_id, "UNKNOWN", reasons.beside_but(ended.report, 1e3 * aside))
         ticket = self._queue.get(point_id)
         accepted = None if ticket is None else ticket.accepted
-        if self._tried.get(point_id) is None or self._tried[point_id] is not accepted:
-            self._tried[point_id] = accepted
+        if self._tried.get(point_id, (None, False))[0] is not accepted or accepted is None:
+            self._tried[point_id] = accepted, done
             again = reasons.stands_cut_again(ended.report)
             self._queue.again(point_id, again)
             return reasons.cut_ended(point_id, again)

@@ -644,6 +644,9 @@ class CloseUp(MovingStage):
             return self, result
         parts.close_ups.forget(self.point_id)
         ticket = parts.queue.get(self.point_id)
+        if close_up.finding == "severed" and (told := parts.post_cut_check.is_off(self.point_id)):
+            # The next period leaves it.
+            return self, result.with_event(told)
         if why := not_as_accepted(close_up, ticket):
             if undecided(close_up) and not parts.queue.last_try(self.point_id):
                 return self._another_time(robot, why)

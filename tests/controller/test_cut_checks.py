@@ -93,6 +93,34 @@ def test_what_stands_is_cut_once_more_and_no_third_time(second: m.Outcome, state
     assert work.cut(second, "seen") == state and work.ticket.reason.code in ("stands_unknown", "stands_not_cut")
 
 
+@pytest.mark.parametrize(("first", "state"), [("DONE", "DONE"), ("FAILED_NOT_CUT", "ACCEPTED")])
+def test_a_cane_that_seemed_to_stand_and_is_off_before_the_second_bite_was_cut(first: m.Outcome, state: str) -> None:
+    work = Work()
+    assert work.check.is_off("a") is None
+    work.cut(first, "seen")
+    told = work.check.is_off("a")
+    assert work.state == state and (told is None) is (state == "ACCEPTED")
+
+
+def test_the_blades_do_not_bite_again_where_the_second_look_shows_the_cane_off() -> None:
+    r = working((point("a", (0.5, 0.75, 1.0)),))
+    usual, looks = r.close_up, []
+
+    def stands_at_first(request):
+        found = usual(request)
+        if r.cuts:
+            looks.append(found.finding)
+            if len(looks) == 1:
+                place = {"position": (0.5, 0.75, 1.0), "tangent": (0.0, 0.0, 1.0)}
+                return msgspec.structs.replace(found, finding="seen", **place)
+        return found
+
+    r.close_up = stands_at_first
+    finish(r, 60.0)
+    assert len(r.cuts) == 1 and len(looks) >= 2
+    assert entry(r, "a").state == "DONE" and entry(r, "a").reason == reasons.cut_and_gone()
+
+
 def test_a_cane_that_is_seen_beside_the_cut_hangs_and_is_not_cut_again() -> None:
     work = Work()
     assert work.cut("DONE", "seen", 0.02) == "DONE" and work.ticket.reason == reasons.cut_and_hangs(20.0)
