@@ -9,7 +9,7 @@ The search is a generator that yields after each iteration, so that a control pe
 
 import math
 from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import chain, pairwise, product
 from typing import Any
@@ -254,6 +254,20 @@ class _Posture:
     omega: float
 
 
+@dataclass
+class _PassedOver:
+    """What a search has passed over.
+
+    Attributes:
+        near: What was too near, by how much (m).
+        narrow: Ways of the tool that lack only what a plan has to spare: how much and where along the wood (m), approach
+            and poses.
+    """
+
+    near: list[tuple[float, Reason]] = field(default_factory=list)
+    narrow: list[tuple[float, float, Approach, CutPoses]] = field(default_factory=list)
+
+
 class PostureSearch:
     """Searches cut plans. It has its own robot model, so that a search can be suspended while control runs."""
 
@@ -290,20 +304,19 @@ class PostureSearch:
             azimuth: Turn of the approach about the cane (rad) set by a person; None leaves it to the search.
             tried: Failed tries: another approach is found, with room beside the canes that were met.
         """
-        passed_over: list[tuple[float, Reason]] = []
-        narrow: list[tuple[float, float, Approach, CutPoses]] = []
+        passed = _PassedOver()
         for along in places(point):
-            found = yield from self._find_at(along, point, q, azimuth, tried, passed_over, narrow)
+            found = yield from self._find_at(along, point, q, azimuth, tried, passed)
             if found is not None:
                 return found
             # Another place helps where something is in the way, not where the arm does not get there.
-            if not passed_over:
+            if not passed.near:
                 return Unreachable(self._beyond(np.array(point.position), q))
         # Better slowly past something than not at all.
-        for _, along, approach, poses in sorted(narrow, key=lambda each: each[0]):
-            if (plan := (yield from self._best(poses, approach, q, passed_over, spare=False))) is not None:
+        for _, along, approach, poses in sorted(passed.narrow, key=lambda each: each[0]):
+            if (plan := (yield from self._best(poses, approach, q, passed, spare=False))) is not None:
                 return replace(plan, along=along)
-        return Unreachable(reasons.no_clear_posture(min(passed_over, key=lambda each: each[0])[1]))
+        return Unreachable(reasons.no_clear_posture(min(passed.near, key=lambda each: each[0])[1]))
 
     def _find_at(
         self,
@@ -312,14 +325,9 @@ class PostureSearch:
         q: Array,
         azimuth: float | None,
         tried: Sequence[Tried],
-        passed_over: list[tuple[float, Reason]],
-        narrow: list[tuple[float, float, Approach, CutPoses]],
+        passed: "_PassedOver",
     ) -> Generator[None, None, CutPlan | Unreachable | None]:
-        """The same at one place; None without a plan there.
-
-        What was too near is added to `passed_over`, and ways of the tool that lack only what a plan has to spare to
-        `narrow`.
-        """
+        """The same at one place; None without a plan there, and then `passed` has what was in the way."""
         tangent = np.array(point.tangent)
         position = np.array(point.position) + along * tangent
         usual = len(APPROACHES if azimuth is None else TILTS)
@@ -331,7 +339,7 @@ class PostureSearch:
         tight: list[tuple[float, Approach, CutPoses]] = []
         for number, approach in enumerate(wanted):
             # More approaches help where something is in the way, not where the arm does not get there.
-            if number == usual and not passed_over and not tight:
+            if number == usual and not passed.near and not tight:
                 break
             try:
                 poses = self._poses(position, tangent, approach)
@@ -339,9 +347,9 @@ class PostureSearch:
                 return Unreachable(reasons.no_square_approach())
             lacking, nearest = self._clearance.tool_too_near(poses, point)
             if nearest is not None:
-                passed_over.append((lacking, nearest))
+                passed.near.append((lacking, nearest))
                 if lacking <= _SPARE and self._clearance.tool_too_near(poses, point, spare=False)[1] is None:
-                    narrow.append((lacking, along, approach, poses))
+                    passed.narrow.append((lacking, along, approach, poses))
                 yield
                 continue
             yield
@@ -350,10 +358,10 @@ class PostureSearch:
                 yield
                 continue
             # A good posture with the straight approach is preferred to a better one from the side.
-            if (plan := (yield from self._best(poses, approach, q, passed_over))) is not None:
+            if (plan := (yield from self._best(poses, approach, q, passed))) is not None:
                 return replace(plan, along=along)
         for _, approach, poses in sorted(tight, key=lambda each: -each[0]):
-            if (plan := (yield from self._best(poses, approach, q, passed_over))) is not None:
+            if (plan := (yield from self._best(poses, approach, q, passed))) is not None:
                 return replace(plan, along=along)
         return None
 
@@ -421,9 +429,9 @@ class PostureSearch:
         return [planned, *sorted(others, key=lambda each: (math.dist(each, planned), each))]
 
     def _best(
-        self, poses: CutPoses, approach: Approach, q: Array, passed_over: list[tuple[float, Reason]], spare: bool = True
+        self, poses: CutPoses, approach: Approach, q: Array, passed: "_PassedOver", spare: bool = True
     ) -> Generator[None, None, CutPlan | None]:
-        """The first good plan with an approach, else the best one; adds what was too near to `passed_over`."""
+        """The first good plan with an approach, else the best one; adds what was in the way to `passed`."""
         config, position = self._config, poses.cut.translation
         best: CutPlan | None = None
         lateral = float(np.array([q[0], q[1], 0.0]) @ self._left)
@@ -440,7 +448,7 @@ class PostureSearch:
                 plan = replace(plan, approach=approach)
                 lacking, nearest = self._clearance.too_near(plan, spare)
                 if nearest is not None:
-                    passed_over.append((lacking, nearest))
+                    passed.near.append((lacking, nearest))
                     continue
                 if plan.joint_margin >= _GOOD_MARGIN and plan.manipulability >= _GOOD_OMEGA:
                     return plan
