@@ -260,8 +260,8 @@ class _PassedOver:
 
     Attributes:
         near: What was too near, by how much (m).
-        narrow: Ways of the tool that lack only what a plan has to spare: how much and where along the wood (m), approach
-            and poses.
+        narrow: Ways of the tool that lack only what a plan has to spare: how much, and where along the wood (m);
+            approach and poses.
     """
 
     near: list[tuple[float, Reason]] = field(default_factory=list)
