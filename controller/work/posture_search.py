@@ -327,7 +327,11 @@ class PostureSearch:
         tried: Sequence[Tried],
         passed: "_PassedOver",
     ) -> Generator[None, None, CutPlan | Unreachable | None]:
-        """The same at one place; None without a plan there, and then `passed` has what was in the way."""
+        """Search at one place along the wood.
+
+        Returns:
+            None without a plan there; `passed` then holds the obstacles.
+        """
         tangent = np.array(point.tangent)
         position = np.array(point.position) + along * tangent
         usual = len(APPROACHES if azimuth is None else TILTS)
@@ -431,7 +435,7 @@ class PostureSearch:
     def _best(
         self, poses: CutPoses, approach: Approach, q: Array, passed: "_PassedOver", spare: bool = True
     ) -> Generator[None, None, CutPlan | None]:
-        """The first good plan with an approach, else the best one; adds what was in the way to `passed`."""
+        """The first good plan with an approach, else the best one. Adds obstacles to `passed`."""
         config, position = self._config, poses.cut.translation
         best: CutPlan | None = None
         lateral = float(np.array([q[0], q[1], 0.0]) @ self._left)

@@ -33,8 +33,8 @@ CUTTING_STRENGTH = 9.34e6
 _VISIBLE_HALF_WIDTH = 0.008
 #: Confidence of a renewal cut beside a cane whose own cut is undecided: never one that is accepted unseen.
 _DOUBTFUL = 0.5
-#: Where the blades have no room, a cane may be cut so much nearer to the last kept node than the best place, or so much
-#: farther out (m): with the usual offset, and what is known of a cut's place, still 10 to 30 mm past the node.
+#: Largest shift of a cut from its best place towards the last kept node, and away from it (m), where the blades have no
+#: room. With an offset of 20 mm the cut stays 10 to 30 mm past the node, also if its place is off by 3 mm.
 _INWARD, _OUTWARD = 0.005, 0.007
 #: Spacing of places that are looked at for that (m).
 _PLACE_STEP = 0.001

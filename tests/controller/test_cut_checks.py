@@ -110,14 +110,15 @@ def test_the_blades_do_not_bite_again_where_the_second_look_shows_the_cane_off()
         found = usual(request)
         if r.cuts:
             looks.append(found.finding)
-            if len(looks) == 1:
+            # Two pictures decide.
+            if len(looks) <= 2:
                 place = {"position": (0.5, 0.75, 1.0), "tangent": (0.0, 0.0, 1.0)}
                 return msgspec.structs.replace(found, finding="seen", **place)
         return found
 
     r.close_up = stands_at_first
     finish(r, 60.0)
-    assert len(r.cuts) == 1 and len(looks) >= 2
+    assert len(r.cuts) == 1 and any("it is cut once more" in event for event in r.events)
     assert entry(r, "a").state == "DONE" and entry(r, "a").reason == reasons.cut_and_gone()
 
 

@@ -1,7 +1,7 @@
 """The camera's gyroscope and accelerometer, with bias and noise.
 
-Real ones filter what is faster than their samples, such as blades that rub on wood. So a sample has the turn since the
-one before and the mean of the force.
+A real sensor filters vibration that is faster than its samples, as of blades that rub on wood. So a sample here holds
+the rotation since the sample before, and the mean force.
 """
 
 from typing import Any
