@@ -1,6 +1,7 @@
 """Request and response bodies of the REST interface that are no messages: strict types and bounds, no NaN."""
 
 import json
+import re
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
@@ -10,6 +11,8 @@ from rolling_panda.messages.types import Reason, Role
 
 #: Leaves room for the user's name in a log line of 500 characters.
 STOP_REASON_LENGTH = 400
+#: Ids that two presses hardly have in common.
+_PRESS = re.compile("[0-9a-zA-Z-]{16,64}")
 _Metre = Annotated[float, Field(ge=-1e4, le=1e4)]
 _Unit = Annotated[float, Field(ge=-1.001, le=1.001)]
 
@@ -67,20 +70,33 @@ class SignInMethod(BaseModel):
 
 
 class Stop(_Body):
-    """The reason, for the log. It cannot make the stop fail: it is truncated if too long and ignored if unreadable."""
+    """The reason, for the log, and the id of the press, which a repeated request has again.
+
+    Neither can make the stop fail: a reason is truncated if too long, and what is unreadable is ignored.
+    """
 
     reason: str = "software stop"
+    press: str = ""
 
     @classmethod
     def read(cls, content: bytes) -> "Stop":
         """The stop of a request body, whatever it contains."""
         try:
-            reason = json.loads(content)["reason"]
-        except (ValueError, RecursionError, LookupError, TypeError):
+            told = json.loads(content)
+        except (ValueError, RecursionError):
             return cls()
-        # A lone surrogate is valid JSON, but cannot be encoded as UTF-8.
-        text = reason.encode(errors="replace").decode() if isinstance(reason, str) else ""
-        return cls(reason=text[:STOP_REASON_LENGTH]) if text else cls()
+        reason, press = (_text(told, name) for name in ("reason", "press"))
+        return cls(
+            reason=reason[:STOP_REASON_LENGTH] or cls.model_fields["reason"].default,
+            press=press if _PRESS.fullmatch(press) else "",
+        )
+
+
+def _text(told: object, name: str) -> str:
+    """The text of this name in a body; empty without one."""
+    value = told.get(name) if isinstance(told, dict) else None
+    # A lone surrogate is valid JSON, but cannot be encoded as UTF-8.
+    return value.encode(errors="replace").decode() if isinstance(value, str) else ""
 
 
 class Target(JsonTuples):

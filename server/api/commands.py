@@ -47,7 +47,8 @@ def commands_router(robot: RobotContext) -> APIRouter:
 
         `reason` says which of them have latched it. A missing or unreadable body does not prevent the stop.
         """
-        return answer(await robot.commands.stop(session, body.Stop.read(await request.body()).reason))
+        told = body.Stop.read(await request.body())
+        return answer(await robot.commands.stop(session, told.reason, told.press))
 
     @router.post("/teleop", tags=["teleoperation"], responses=COMMAND | TOO_MANY)
     async def teleop(session: Operator, request: body.Teleop) -> Response:

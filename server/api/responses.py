@@ -83,7 +83,10 @@ def message(content: msgspec.Struct) -> Response:
 #: The body of a stop, which is read leniently.
 STOP_BODY: dict[str, Any] = {
     "requestBody": {
-        "description": "`reason` is for the log. An unreadable body is ignored, and a reason that is too long is cut.",
-        "content": {"application/json": {"schema": {"examples": [{"reason": "a dog in the row"}]}}},
+        "description": "`reason` is for the log. A request with the `press` of an earlier one is the same stop, "
+        "and does not stop again after the reset. An unreadable body is ignored, and a reason that is too long is cut.",
+        "content": {
+            "application/json": {"schema": {"examples": [{"reason": "dog in the row", "press": "5f0c2d9a71e3b846"}]}}
+        },
     }
 }

@@ -44,8 +44,7 @@ def robots_router(app_state: AppState) -> APIRouter:
 
         A missing or unreadable body does not prevent the stop.
         """
-        reason = body.Stop.read(await request.body()).reason
-        return answer(await stop_all(app_state.robots, session, reason))
+        return answer(await stop_all(app_state.robots, session, body.Stop.read(await request.body())))
 
     @router.get(f"{ROBOTS}/{{name}}", include_in_schema=False)
     async def robot(name: str) -> Response:
@@ -60,9 +59,10 @@ def robots_router(app_state: AppState) -> APIRouter:
     return router
 
 
-async def stop_all(robots: dict[str, RobotContext], session: Session, reason: str) -> Result:
+async def stop_all(robots: dict[str, RobotContext], session: Session, stop: body.Stop) -> Result:
     """Stop every robot at once; the status is the worst, the reason names the robots that have not confirmed."""
-    results = await asyncio.gather(*(robot.commands.stop(session, reason) for robot in robots.values()))
+    commands = [robot.commands for robot in robots.values()]
+    results = await asyncio.gather(*(each.stop(session, stop.reason, stop.press) for each in commands))
     by_code: dict[str, list[str]] = {}
     for name, result in zip(robots, results, strict=True):
         by_code.setdefault("" if result.reason is None else result.reason.code, []).append(name)

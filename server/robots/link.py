@@ -4,6 +4,7 @@ Zenoh's callbacks run on its own threads; they only store to slots and feeds, wh
 """
 
 import asyncio
+import hashlib
 import secrets
 import threading
 import time
@@ -129,12 +130,12 @@ class RobotLink:
         loop = asyncio.get_running_loop()
         return await loop.run_in_executor(self._callers, self._transport.call, service, request)
 
-    def send_stop(self, user: str, reason: str) -> str:
-        """Send the software stop, repeated over 100 ms; returns its id. It needs no controller.
+    def send_stop(self, stop_id: str, user: str, reason: str) -> None:
+        """Send the software stop, repeated over 100 ms. It needs no controller.
 
         It is sent on its own thread, since the topic blocks when the wire is congested.
         """
-        request = m.StopRequest(stop_id=f"s-{secrets.token_hex(8)}", source="server", user=user, reason=said(reason))
+        request = m.StopRequest(stop_id=stop_id, source="server", user=user, reason=said(reason))
 
         def send() -> None:
             self._stop.put(request)
@@ -143,7 +144,6 @@ class RobotLink:
                 self._stop.put(request)
 
         threading.Thread(target=send, name="stop", daemon=True).start()
-        return request.stop_id
 
     def not_latched(self, stop_id: str) -> tuple[str, ...]:
         """Those of bridge and controller that have not reported this stop as latched."""
@@ -230,6 +230,8 @@ class RobotLink:
 
 
 _CONFIRM_POLL_S = 0.01
+#: Number of confirmed stops that are remembered, for requests that are repeated.
+_CONFIRMED = 1000
 
 
 @dataclass(frozen=True)
@@ -274,6 +276,7 @@ class RobotCommands:
         """
         self._link, self._log = link, log
         self._view_age_s, self._on_stop, self._stop_confirm_s = view_age_s, on_stop, stop_confirm_s
+        self._confirmed: deque[str] = deque(maxlen=_CONFIRMED)
 
     async def ask(self, session: Session, intent: intents.Intent) -> Result:
         """Send an intent to the controller, which logs its answer."""
@@ -309,17 +312,34 @@ class RobotCommands:
             return Result(503, silent)
         return result_of(answer)
 
-    async def stop(self, session: Session, reason: str) -> Result:
-        """Send the software stop at once, and wait until bridge and controller report it latched."""
+    async def stop(self, session: Session, reason: str, press: str) -> Result:
+        """Send the software stop at once, and wait until bridge and controller report it latched.
+
+        Args:
+            session: Whose.
+            reason: For the log.
+            press: What a repeated request has in common with the first one; empty if it tells nothing. Confirmed once,
+                it is not sent again: somebody may have reset it meanwhile.
+        """
         sent_at = time.monotonic()
-        stop_id = self._link.send_stop(session.user, reason)
+        stop_id = _stop_id(session, press)
+        if stop_id in self._confirmed:
+            return Result(200, reasons.stop_confirmed())
+        self._link.send_stop(stop_id, session.user, reason)
         self._on_stop()
         self._log.note(reasons.software_stop(session.user, reasons.said(reason)), f"stop {session.client}")
         while (missing := self._link.not_latched(stop_id)) and time.monotonic() - sent_at < self._stop_confirm_s:
             await asyncio.sleep(_CONFIRM_POLL_S)
         if "bridge" in missing:
             return Result(503, reasons.stop_unconfirmed())
+        self._confirmed.append(stop_id)
         return Result(200, reasons.stop_half_confirmed() if missing else reasons.stop_confirmed())
+
+
+def _stop_id(session: Session, press: str) -> str:
+    """The same for the same press of the same browser, another one for any other."""
+    token = hashlib.sha256(f"{session.client} {press}".encode()).hexdigest()[:16] if press else secrets.token_hex(8)
+    return f"s-{token}"
 
 
 def result_of(answer: m.Answer) -> Result:

@@ -227,6 +227,34 @@ def test_stop_is_sent_several_times_and_says_who_has_latched_it(server, client, 
     }
 
 
+def test_a_press_that_was_confirmed_does_not_stop_again_after_the_reset(server, client):
+    sent = server.wire.sent[topics.STOP.name]
+
+    def ids():
+        """Of the stops that were sent, in their order."""
+        return list(dict.fromkeys(stop.stop_id for stop in sent))
+
+    def post(press, browser=client):
+        return browser.post("/api/stop", json={"reason": "branch", "press": press}).status_code
+
+    # What nobody has confirmed is sent again, as the same stop.
+    assert [post("a" * 16), post("a" * 16)] == [503, 503]
+    eventually(lambda: len(sent) == 10)
+    assert len(ids()) == 1
+    server.wire.deliver(topics.BRIDGE, bridge_state(ids()[0]))
+    assert post("a" * 16) == 200
+    server.wire.deliver(topics.BRIDGE, bridge_state(""))
+    eventually(lambda: len(sent) == 15)
+    assert post("a" * 16) == 200
+    assert len(sent) == 15
+    # Another press, one of somebody else, and one that tells nothing are new ones.
+    assert [post("b" * 16), post(""), post("")] == [503, 503, 503]
+    with server.client(user="ben") as other:
+        assert post("a" * 16, other) == 503
+    eventually(lambda: len(sent) == 35)
+    assert len(ids()) == 5
+
+
 def test_stop_goes_out_although_nothing_else_lives_and_says_that_nobody_confirmed_it(server, client):
     server.wire.answer = None
     answer = client.post("/api/stop", json={})

@@ -98,6 +98,7 @@ def stop_in_mid_approach(page: Page, robot: LiveRobot, stop: Press) -> float:
 def reset_and_arm(page: Page, robot: LiveRobot) -> None:
     robot.post("reset", reason="pressed by this test")
     robot.wait(lambda: robot.mode() == "IDLE", 10, "IDLE")
+    page.wait_for_selector('#mode[data-mode="IDLE"]', timeout=15_000)
     page.click("#arm")
     robot.wait(lambda: robot.mode() == "READY", 10, "READY")
 

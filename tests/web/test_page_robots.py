@@ -130,7 +130,7 @@ def test_the_other_robot_is_seen_and_chosen_and_nothing_reaches_the_wrong_one(pa
     assert one.posted == []
     expect(page.locator("#stop")).to_contain_text("all robots")
     page.keyboard.press("Space")
-    until(page, lambda: hall.stops == [{"reason": "space bar"}])
+    until(page, lambda: [stop["reason"] for stop in hall.stops] == ["space bar"])
     assert not one.stops() + two.stops()
     # On the way back the charts of the first one go on where they were left.
     first.click()

@@ -25,9 +25,10 @@ export async function stopRobot(reason) {
   stopProgress.set("sending");
   let refusal = /** @type {import("../state/reasons.js").Reason|null} */ (null);
   let unconfirmed = 0;
+  const press = pressId();
   for (let attempt = 0; attempt < TRIES; attempt++) {
     // At the root path: stops every robot of this server.
-    const answer = await post("/api/stop", { reason }, 1000);
+    const answer = await post("/api/stop", { reason, press }, 1000);
     if (answer.ok) {
       stopProgress.set("sent");
       return;
@@ -38,6 +39,11 @@ export async function stopRobot(reason) {
   }
   stopProgress.set("failed");
   say("error", text(unconfirmed > 0 ? "stop.not_confirmed" : "stop.not_through", { why: reasonText(refusal) }));
+}
+
+/** Tells the server what is one press: repeated after the reset, it does not stop again. */
+function pressId() {
+  return Array.from(crypto.getRandomValues(new Uint8Array(8)), (byte) => byte.toString(16).padStart(2, "0")).join("");
 }
 
 /**
