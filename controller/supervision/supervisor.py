@@ -128,8 +128,11 @@ class Supervisor:
             case safety.Verdict("protect", reason):
                 # Where the robot goes back after a contact, another cause ends that.
                 self._movement.stay()
+                touched = reason is self.health.contact
+                if touched and (told := self._movement.contact()) is not None:
+                    self._event_log.log(told)
                 self.event(Event.PROTECT, now, reason)
-                if reason is self.health.contact:
+                if touched:
                     self._movement.back_off()
             case safety.Verdict("pause", reason):
                 self._pause(reason, now)

@@ -579,6 +579,26 @@ class MovingStage(TaskStage):
         parts.next_cut.forget()
         return Escape(parts), parts.brake(robot).with_event(told)
 
+    def put_off(self, touch: Touch, frame: MapFrame, again: m.Reason, why: m.Reason) -> m.Reason:
+        """Leave the cut for a try from another side, after the others, as something is in the way.
+
+        Args:
+            touch: What is.
+            frame: Where odom is in map.
+            again: Reason while the cut is to be tried again.
+            why: Reason where this was the last try.
+
+        Returns:
+            What is logged.
+        """
+        parts, cane = self._parts, None
+        if touch.axis is not None:
+            start, end = (vector3(frame.position_in_map(np.array(each))) for each in touch.axis)
+            cane = start, end
+        parts.next_cut.forget()
+        parts.close_ups.forget(self.point_id)
+        return parts.queue.put_off(self.point_id, Tried(self._task.planned.approach, cane), again, why)
+
     def _retreat(self, robot: Measured) -> "Retreat":
         """Straight out of the canes, and on to the next cut where one is found."""
         parts, following = self._parts, self._parts.next_cut
@@ -789,6 +809,9 @@ class Advance(MovingStage):
             parts.next_cut.forget()
             return self._retreat(robot), result.with_event(told)
         return self, result
+
+
+_WayIn = Travel | CloseUp | Fitting | Advance
 
 
 class Cutting(MovingStage):
@@ -1079,8 +1102,7 @@ class CutSequence:
     @property
     def may_give_way(self) -> bool:
         """Whether a known cane that pushes now is no contact."""
-        ways_in = Travel | CloseUp | Fitting | Advance
-        return self._stage.yields and (not isinstance(self._stage, ways_in) or self._parts.gave_way < _PUSHES)
+        return self._stage.yields and (not isinstance(self._stage, _WayIn) or self._parts.gave_way < _PUSHES)
 
     def pushed(self, contact: ContactMonitor, trail: Trail, frame: MapFrame) -> m.Reason | None:
         """React to the push of a known cane: on the way to a cut put it off and go back, on the way out go on.
@@ -1097,19 +1119,28 @@ class CutSequence:
         if push is None or push.axis is None or isinstance(stage, GivingWay):
             return None
         what = push.part, push.obstacle, float(np.linalg.norm(push.force))
-        if push is self._pushed or not isinstance(stage, Travel | CloseUp | Fitting | Advance):
+        if push is self._pushed or not isinstance(stage, _WayIn):
             # The way back would lead into the canes.
             news, self._pushed = push is not self._pushed, push
             if not contact.beyond:
                 contact.gave_way(free=True)
             return reasons.cane_on_way_out(*what) if news else None
         parts.gave_way += 1
-        parts.next_cut.forget()
-        parts.close_ups.forget(stage.point_id)
-        start, end = (vector3(frame.position_in_map(np.array(each))) for each in push.axis)
         self._stage = GivingWay(parts, contact, tuple(trail))
-        tried = Tried(stage.plan.approach, (start, end))
-        return parts.queue.put_off(stage.point_id, tried, reasons.cane_met(*what), reasons.cane_in_way(*what))
+        return stage.put_off(push, frame, reasons.cane_met(*what), reasons.cane_in_way(*what))
+
+    def stopped_by(self, touch: Touch, frame: MapFrame) -> m.Reason | None:
+        """A contact stops the robot. On the way to a cut it is put off, so that the next try comes from elsewhere.
+
+        Args:
+            touch: The contact.
+            frame: Where odom is in map.
+
+        Returns:
+            What is logged; None without news.
+        """
+        stage, why = self._stage, touch.reason
+        return stage.put_off(touch, frame, reasons.missed_once(why), why) if isinstance(stage, _WayIn) else None
 
     def hold(self) -> None:
         """Stand for one period in place of `step`. A close-up or a cut that was asked for goes on."""

@@ -476,6 +476,39 @@ def test_a_hard_push_of_a_cane_stops_it_for_a_person(phase, state):
     assert entry(r, "a").state == state, "after a cut its last close-up is still to come"
 
 
+def go_on(pushed):
+    """A person goes on after a contact, once the robot has gone back."""
+    r = pushed.r
+    pushed.run(lambda s: s.mode == "PROTECTIVE_STOP" and r.ask(intents.Acknowledge(user="ada")).ok)
+    r.run(0.1)
+    assert r.ask(intents.Resume(user="ada")).ok
+    r.run(0.1)
+    assert r.ask(intents.Start(user="ada")).ok
+    r.run(0.1)
+
+
+def test_a_cut_that_a_contact_stopped_on_the_way_is_made_after_the_others_from_elsewhere():
+    pushed = Pushed(60.0, "ADVANCE", lasts=0.3)
+    r = pushed.run(ended)
+    a = entry(r, "a")
+    assert (r.state.mode, a.state, a.reason.code) == ("PROTECTIVE_STOP", "ACCEPTED", "missed_once")
+    go_on(pushed)
+    pushed.run(done)
+    assert [cut[0] for cut in r.cuts] == ["b", "a"]
+    assert turn(pushed.met[0].rotation, r.cuts[1][1][:3, :3]) > 0.15
+
+
+def test_a_cut_that_contacts_stop_on_the_way_from_everywhere_is_given_up():
+    pushed = Pushed(60.0, "ADVANCE", count=1, most=9, lasts=0.3)
+    for _ in range(2):
+        pushed.run(ended, 200.0)
+        go_on(pushed)
+    r = pushed.run(ended, 200.0)
+    a = entry(r, "a")
+    told = dict(a.reason.values)
+    assert (r.cuts, a.state, told["tries"], told["why"].code) == ([], "FAILED_NOT_CUT", 3, "touched")
+
+
 def test_a_cane_that_goes_on_pushing_stops_it_for_a_person():
     r = Pushed(28.0, "ADVANCE", lasts=30.0).run(ended)
     assert r.state.mode == "PROTECTIVE_STOP" and r.state.reason.code == "touched"
