@@ -69,6 +69,7 @@ class _Cut:
 
     point_id: str
     cut_id: str
+    tried: Tried
     deadline: float
     record: int
     asked_at: float = -math.inf
@@ -96,11 +97,17 @@ class Blades:
         """Whether a cut has been asked for and how it ends is not known yet: the blades may be closing."""
         return self._cut is not None
 
-    def start(self, point_id: str, now: float) -> None:
-        """Intend a cut at a point; no command is sent before that intent is durable."""
+    def start(self, point_id: str, tried: Tried, now: float) -> None:
+        """Intend a cut at a point; no command is sent before that intent is durable.
+
+        Args:
+            point_id: Of the point.
+            tried: What counts as tried if no order is given.
+            now: Monotonic time (s).
+        """
         self._cuts += 1
         cut_id = f"{self._run_id}-{self._cuts}"
-        self._cut = _Cut(point_id, cut_id, now + self._timeout_s, self._queue.begin_cut(point_id, cut_id))
+        self._cut = _Cut(point_id, cut_id, tried, now + self._timeout_s, self._queue.begin_cut(point_id, cut_id))
 
     def command(self, now: float) -> tuple[str, str] | None:
         """(cut_id, point_id) to command in this period; None between repetitions and before the intent is durable."""
@@ -127,8 +134,7 @@ class Blades:
         if now > cut.deadline and cut.asked_at == -math.inf:
             self._cut = None
             why = reasons.no_order_given(self._timeout_s)
-            self._queue.resolve(cut.point_id, "FAILED_NOT_CUT", why)
-            return (reasons.point_not_cut(cut.point_id, why),)
+            return (self._queue.put_off(cut.point_id, cut.tried, reasons.missed_once(why), why),)
         if now > cut.deadline:
             self._cut = None
             why = reasons.no_cutter_report(self._timeout_s)
@@ -798,7 +804,7 @@ class Advance(MovingStage):
             motion.settle(robot.q)
             rests = False
         if rests:
-            parts.blades.start(self.point_id, now)
+            parts.blades.start(self.point_id, Tried(self._task.planned.approach), now)
             parts.gave_way = 0
             return Cutting(parts, self._task, self._way), result
         if timeout.late(now):

@@ -13,6 +13,7 @@ from controller.motion.teleoperation import Teleoperation
 from controller.supervision.modes import Event
 from controller.work.cutting import Blades
 from controller.work.movement import MotionResult
+from controller.work.tries import Tried
 from rolling_panda import reasons
 from rolling_panda.model.map_frame import MapFrame
 from rolling_panda.model.robot import RobotModel
@@ -36,6 +37,9 @@ class Saturation:
 
     def smooth(self, xi, sent, before):
         return xi
+
+
+TRIED = Tried((0.0, 0.0, 0.0))
 
 
 class Sequence:
@@ -69,6 +73,12 @@ class Sequence:
 
     def finish_cut_and_pause(self, why):
         self.ending = why
+
+    def stopped_by(self, touch):
+        ticket = self._queue.get(self.active)
+        if self.in_canes or ticket is None or ticket.state != "ACCEPTED":
+            return None
+        return self._queue.put_off(self.active, TRIED, reasons.missed_once(touch.reason), touch.reason)
 
     def watch(self, bridge, look, sight, now):
         return self.blades.watch(bridge, now)
@@ -104,7 +114,7 @@ class Sequence:
             return MotionResult(WHEELS)
         if not sent.any() and self._left < -3:
             self.in_canes = self.active
-            self.blades.start(self.active, now)
+            self.blades.start(self.active, TRIED, now)
         return MotionResult(rest)
 
 
@@ -163,6 +173,9 @@ class Movement:
 
     def go_home(self):
         self._home = 30
+
+    def contact(self):
+        return self.sequence.stopped_by(self.body.contact.touch)
 
     def back_off(self):
         self._back = 30
