@@ -321,25 +321,19 @@ def _accept(loop: ClosedLoop, points: int) -> list[m.QueueEntry]:
 def _work(loop: ClosedLoop, todo: list[str], person: Supervisor | None) -> dict[str, float]:
     """Run until every point has ended or the work stands still. Returns simulated seconds of work a point."""
     durations: dict[str, float] = {}
-    active, begin = "", loop.now
+    begin = loop.now
 
     def ended() -> set[str]:
         return set(todo) - set(durations) - {entry.point_id for entry in loop.queue(*_OPEN)}
 
-    def something() -> bool:
-        nonlocal active
-        if loop.state is not None and loop.state.mode == "AUTO":
-            active = loop.state.active_point_id
-        return bool(ended()) or loop.controller.mode != "AUTO"
-
-    while loop.run_until(something, _LIMIT_S):
+    while loop.run_until(lambda: bool(ended()) or loop.controller.mode != "AUTO", _LIMIT_S):
         for point_id in (now_ended := ended()):
             durations[point_id] = loop.now - begin
             begin = loop.now
         if now_ended:
             continue
         waited = 0.0 if person is None else person.waited_s
-        if person is None or not person.lets_go_on(loop, active):
+        if person is None or not person.lets_go_on(loop):
             break
         begin += person.waited_s - waited
     loop.run(_AFTER_S)

@@ -1,6 +1,5 @@
 """A person who supervises the work in a row: looks at the robot where it has stopped, and lets it go on."""
 
-from collections import Counter
 from pathlib import Path
 from typing import Literal
 
@@ -14,8 +13,8 @@ USER = "bench"
 _LOOK_S = 20.0
 #: After that a stop whose cause is not gone is given up (s).
 _GONE_S = 5.0
-#: Times that a person lets one row go on, and stops on the way to one point after which they leave it.
-_MOST, _AT_ONE_POINT = 4, 2
+#: Times that a person lets one row go on.
+_MOST = 4
 
 
 class Supervisor:
@@ -33,27 +32,21 @@ class Supervisor:
             trace_path: The simulator's record: what a person sees of a cut.
         """
         self._path = trace_path
-        self._at: Counter[str] = Counter()
         self.cleared = 0
         self.waited_s = 0.0
 
-    def lets_go_on(self, loop: ClosedLoop, point_id: str) -> bool:
-        """Whether the work goes on after the robot has left automatic work by itself.
-
-        Args:
-            loop: The robot.
-            point_id: Point of the work as it stopped; empty without one.
-        """
+    def lets_go_on(self, loop: ClosedLoop) -> bool:
+        """Whether the work goes on after the robot has left automatic work by itself."""
         if loop.controller.mode not in ("PROTECTIVE_STOP", "PAUSED") or self.cleared >= _MOST:
             return False
         begin = loop.now
         loop.run(_LOOK_S)
-        goes_on = self._press(loop, point_id)
+        goes_on = self._press(loop)
         self.waited_s += loop.now - begin
         self.cleared += goes_on
         return goes_on
 
-    def _press(self, loop: ClosedLoop, point_id: str) -> bool:
+    def _press(self, loop: ClosedLoop) -> bool:
         if loop.controller.mode == "PROTECTIVE_STOP":
             loop.run_until(lambda: loop.command(intents.Acknowledge(user=USER)).ok, _GONE_S)
             loop.run(0.1)
@@ -61,9 +54,6 @@ class Supervisor:
             outcome = self._seen(entry.point_id)
             asked = intents.ResolvePoint(user=USER, point_id=entry.point_id, outcome=outcome, reason="looked at it")
             loop.command(asked)
-        self._at[point_id] += 1
-        if point_id and self._at[point_id] >= _AT_ONE_POINT:
-            loop.command(intents.RejectPoint(user=USER, point_id=point_id, reason="the robot stops on the way there"))
         loop.run(0.1)
         return loop.command(intents.Continue(user=USER)).ok
 
