@@ -249,12 +249,12 @@ class KnownSpur:
         return replace(self.best, canes=tuple(sorted(canes, key=lambda cane: -cane.length)))
 
     def hidden_canes(self, seen: tuple[Cane, ...]) -> tuple[Cane, ...]:
-        """The standing canes that at least half of the observations have shown, but this one does not."""
+        """The standing canes that at least a third of the observations have shown, but this one does not."""
         numbers = {cane.number for cane in seen}
         return tuple(
             cane.with_other_views(cane.best)
             for cane in self.canes
-            if cane.number not in numbers and 2 * cane.base.count >= self.position.count and np.isinf(cane.cut_at)
+            if cane.number not in numbers and 3 * cane.base.count >= self.position.count and np.isinf(cane.cut_at)
         )
 
     def nearest_cane(self, position: Array) -> tuple[int, float, float]:
@@ -290,7 +290,7 @@ class PlantMap:
     def update(self, plant: Plant, numbers: tuple[SpurNumber, ...]) -> tuple[Spur, ...]:
         """Add the plant of one frame; returns its spurs with the median stub, and their canes as all frames show them.
 
-        They have the hidden canes that at least half of the observations have shown.
+        They have the hidden canes that at least a third of the observations have shown.
 
         Args:
             plant: Plant of one frame.
