@@ -36,7 +36,7 @@ class RuleConfig(Struct, frozen=True, forbid_unknown_fields=True):
         blade_half: Half the thickness of the blades, with the radius of a cane and the error of its place (m).
         blade_turn: Largest turn of the blades about the wood in a renewal cut (rad), that of the controller.
         blade_tilt: Their largest tilt out of the plane square to the wood (rad), that of the controller.
-        blade_lean: Their largest lean about the approach (rad), that of the controller.
+        blade_lean: Their largest lean about the approach (rad); where it must the controller leans them more.
         crossing_distance: Distance of other canes from a cut: half the opening of the blades (m).
         max_base_gap: Longest hidden stretch at the base of a cane whose nodes can be counted (m).
         max_diameter: Thickest cane that the shears may cut (m).

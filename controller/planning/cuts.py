@@ -104,7 +104,27 @@ class CutPlanner:
         start = self._robot.pose(request.q, self._robot.tool_id).copy(), request.q
         fastest = [names[i] for i in shortest(travel_times(self._config, self._flows, start, list(cuts.values())))]
         tried = dict(request.tries)
-        return sorted(fastest, key=lambda name: name in tried)
+        return sorted(self._freed(request, cuts, fastest), key=lambda name: name in tried)
+
+    def _freed(self, request: PlanRequest, cuts: dict[str, CutPlan], order: list[str]) -> list[str]:
+        """The order with a stub before the cut on the same spur whose open blades would push a cane, if there is one.
+
+        The canes that go with the stub often are the ones that would be pushed.
+        """
+        points = {point.point_id: point for point in request.points}
+        stubs = {
+            (point.vine, point.spur): point.point_id
+            for point in request.points
+            if point.kind == "renewal cut" and point.point_id in cuts
+        }
+        for name in order.copy():
+            point = points[name]
+            stub = stubs.get((point.vine, point.spur), name)
+            tight = stub != name and self._clearance.beside(cuts[name].poses, point) < 0.0
+            if tight and order.index(stub) > order.index(name):
+                order.remove(stub)
+                order.insert(order.index(name), stub)
+        return order
 
     def _roll(self, request: PlanRequest, cuts: dict[str, CutPlan], order: Sequence[str]) -> Preview:
         """Rollout of the first cuts of an order."""

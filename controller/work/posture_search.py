@@ -149,15 +149,17 @@ APPROACHES: tuple[Approach, ...] = (
 TILTS = (0.0, 0.2, 0.26, -0.26)
 #: Where none of these has room: turns, tilts and leans in all combinations, the smallest first. On a stub the blades
 #: lean more, as a person's shears do, to pass the cane that stays.
+_TURNS, _TILTS, _LEANS, _STUB_LEANS = (0.0, 0.35, 0.7), (0.0, 0.13, 0.26), (0.0, 0.13, 0.26), (0.0, 0.2, 0.4, 0.6, 0.8)
 #: Places of a cut along its wood in order of preference (m), as far as its point allows them.
 _ALONG = (0.0, 0.0025, -0.0025, 0.005, -0.005, 0.007)
-_TURNS, _TILTS, _LEANS, _STUB_LEANS = (0.0, 0.35, 0.7), (0.0, 0.13, 0.26), (0.0, 0.13, 0.26), (0.0, 0.15, 0.3, 0.44)
 #: An approach that differs from a tried one by this is another one (rad), and room beside a cane that was met which is
 #: enough (m): how far canes lean and swing, and what the map may err.
 _ANOTHER, _ENOUGH = 0.2, 0.03
 #: Room of the tool on the way in beside canes that would give way (m), which is enough: with less another approach is
 #: preferred, which may be slower and pass wires more closely.
-_BESIDE_ENOUGH = 0.003
+_BESIDE_ENOUGH = 0.005
+#: Room that a place farther along the wood has to bring, as a share of that distance.
+_WORTH = 0.5
 #: Most postures that are tried for a cut that is seen elsewhere than planned: the robot waits for them.
 _FITS = 12
 #: Largest distance from the arm's shoulder to its wrist, with elbow and wrist offsets (m, Panda), and from the
@@ -260,11 +262,13 @@ class _PassedOver:
 
     Attributes:
         near: What was too near, by how much (m).
-        narrow: Ways of the tool that lack only what a plan has to spare: how much, and where along the wood (m);
+        tight: Ways of the tool on which open blades would push canes: their room, and where along the wood (m);
             approach and poses.
+        narrow: Ways that lack only what a plan has to spare: how much; the rest as of `tight`.
     """
 
     near: list[tuple[float, Reason]] = field(default_factory=list)
+    tight: list[tuple[float, float, Approach, CutPoses]] = field(default_factory=list)
     narrow: list[tuple[float, float, Approach, CutPoses]] = field(default_factory=list)
 
 
@@ -310,8 +314,13 @@ class PostureSearch:
             if found is not None:
                 return found
             # Another place helps where something is in the way, not where the arm does not get there.
-            if not passed.near:
+            if not passed.near and not passed.tight:
                 return Unreachable(self._beyond(np.array(point.position), q))
+        for _, along, approach, poses in sorted(passed.tight, key=lambda each: _WORTH * abs(each[1]) - each[0]):
+            if (plan := (yield from self._best(poses, approach, q, passed))) is not None:
+                return replace(plan, along=along)
+        if not passed.near:
+            return Unreachable(self._beyond(np.array(point.position), q))
         # Better slowly past something than not at all.
         for _, along, approach, poses in sorted(passed.narrow, key=lambda each: each[0]):
             if (plan := (yield from self._best(poses, approach, q, passed, spare=False))) is not None:
@@ -330,7 +339,7 @@ class PostureSearch:
         """Search at one place along the wood.
 
         Returns:
-            None without a plan there; `passed` then holds the obstacles.
+            None without a plan there that pushes no cane; `passed` then holds the obstacles.
         """
         tangent = np.array(point.tangent)
         position = np.array(point.position) + along * tangent
@@ -339,11 +348,9 @@ class PostureSearch:
         if tried:
             wanted = yield from self._others(wanted, tried, position, tangent)
             usual = len(wanted)
-        # Where open blades would push canes aside, after the others: those with the most room first.
-        tight: list[tuple[float, Approach, CutPoses]] = []
         for number, approach in enumerate(wanted):
             # More approaches help where something is in the way, not where the arm does not get there.
-            if number == usual and not passed.near and not tight:
+            if number == usual and not passed.near and not passed.tight:
                 break
             try:
                 poses = self._poses(position, tangent, approach)
@@ -358,13 +365,10 @@ class PostureSearch:
                 continue
             yield
             if (room := self._clearance.beside(poses, point)) < _BESIDE_ENOUGH:
-                tight.append((room, approach, poses))
+                passed.tight.append((room, along, approach, poses))
                 yield
                 continue
             # A good posture with the straight approach is preferred to a better one from the side.
-            if (plan := (yield from self._best(poses, approach, q, passed))) is not None:
-                return replace(plan, along=along)
-        for _, approach, poses in sorted(tight, key=lambda each: -each[0]):
             if (plan := (yield from self._best(poses, approach, q, passed))) is not None:
                 return replace(plan, along=along)
         return None
@@ -397,7 +401,7 @@ class PostureSearch:
         lacking: Reason | None = None
         left = _FITS
         wanted = self._nearest(plan.approach, point, azimuth, tried) if others else [plan.approach]
-        beside = sorted(places(point), key=lambda each: abs(each - plan.along))
+        beside = yield from self._along_with_room(plan, point, (seen, in_map))
         usual = [(approach, along, approach != plan.approach) for approach, along in product(wanted, beside)]
         # Other approaches that lack only what a plan has to spare, after those that lack nothing.
         narrow: list[tuple[Approach, float, bool]] = []
@@ -420,6 +424,24 @@ class PostureSearch:
             if left == 0:
                 break
         return Fitted(None, lacking)
+
+    def _along_with_room(
+        self, plan: CutPlan, point: PruningPoint, where: tuple[Array, ...]
+    ) -> Generator[None, None, list[float]]:
+        """Places along the wood (m), those first where open blades on the planned approach push no cane.
+
+        Args:
+            plan: The plan.
+            point: The cut.
+            where: Places where the cut may be (3, m, map).
+        """
+        room: dict[float, float] = {}
+        for along in places(point):
+            shift = along * np.array(point.tangent)
+            at = [self._poses(each + shift, np.array(point.tangent), plan.approach) for each in where]
+            room[along] = min(self._clearance.beside(poses, point) for poses in at)
+            yield
+        return sorted(room, key=lambda each: _WORTH * abs(each - plan.along) - min(room[each], _BESIDE_ENOUGH))
 
     def _nearest(
         self, planned: Approach, point: PruningPoint, azimuth: float | None, tried: Sequence[Tried]
@@ -655,21 +677,25 @@ class CutClearance:
         """Least distance of the tool, with open blades, from standing canes on its way into a cut (m).
 
         Canes that will be cut off count too, but for the one that is cut, or those that fall with a stub; so do canes
-        that the blades may push aside. A cane between the blades has none.
+        that the blades may push aside, and the cane that stays on a stub: so near to its base it hardly bends. A cane
+        between the blades has none.
         """
         cut = poses.cut.translation
+        near = self._surroundings.canes_near(cut, _AROUND)
+        staying = Axes(tuple(obstacle for capsule, obstacle in near if not _is_cut(capsule, point)))
+        room = float(self._surroundings.model.tool_gaps((*poses.between, poses.cut), staying).min(initial=math.inf))
         gaps = self._axes.gaps(cut[None], np.zeros(1))[0]
         own = set(self._line_of[gaps < _OWN].tolist())
         if own and point.kind != "renewal cut":
             own = {int(self._line_of[int(np.argmin(gaps))])}
         others = np.flatnonzero((gaps < _AROUND) & ~np.isin(self._line_of, list(own)))
-        if not len(others):
-            return math.inf
         canes = self._axes.part(others)
-        room = float(self._surroundings.model.tool_gaps((*poses.between, poses.cut), canes).min())
+        gaps_of_tool = self._surroundings.model.tool_gaps((*poses.between, poses.cut), canes)
+        room = min(room, float(gaps_of_tool.min(initial=math.inf)))
         for number in np.flatnonzero(gaps[others] < _BESIDE).tolist():
             inside, _ = _in_box((canes.ends(number) - cut) @ poses.cut.rotation)
-            room = min(room, -inside)
+            if inside > 0.0:
+                room = min(room, -inside)
         return room
 
     def _lacking(

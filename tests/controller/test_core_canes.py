@@ -140,7 +140,11 @@ def test_out_of_the_canes_the_tool_gets_on_its_line_also_when_work_was_broken_of
     """Another cane of the spur is within an open blade; the blades stay exempt until they are drawn out."""
     beside = cane(CUT[0] + 0.022, top=1.2)
     r = working((point("a", CUT), OTHER), obstacles=(OWN, beside))
+    # Else the tool would turn until no blade is beside it.
+    assert r.ask(intents.SetApproach(user="ada", point_id="a", azimuth=0.0)).ok
     run_until(r, lambda s: s is not None and s.phase == "CUT", 25.0)
+    beside_blades = r.model.kinematics(r.q).T_odom_tool.rotation.T @ [0.022, 0.0, 0.0]
+    assert abs(beside_blades[0]) > 0.02, "where one of them is open"
     assert r.ask(intents.Pause(user="ada")).ok
     r.run(1.0)
     assert r.ask(intents.Resume(user="ada")).ok and r.ask(intents.Start(user="ada")).ok

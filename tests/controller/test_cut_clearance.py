@@ -102,6 +102,33 @@ def test_blades_that_remove_a_stub_lean_past_the_cane_that_stays(towards):
 
 
 @pytest.mark.parametrize("towards", [1.0, -1.0])
+def test_open_blades_that_remove_a_stub_do_not_press_the_cane_that_stays(towards):
+    """It is no obstacle, since the blades may touch it; but so near to its base it hardly bends."""
+    beside = keeper(0.020, towards)
+    stub = find(beside, tangent=(0.0, 0.0, 1.0), kind="renewal cut")
+    assert isinstance(stub, CutPlan)
+    assert way_room(stub, (beside.start, beside.end)) > beside.start_radius
+
+
+@pytest.mark.parametrize("towards", [1.0, -1.0])
+def test_a_stub_is_cut_farther_out_where_that_brings_more_room_than_half_of_the_way(towards):
+    beside = keeper(0.014, towards)
+    here, out = (find(beside, tangent=(0.0, 0.0, 1.0), kind="renewal cut", **room) for room in ({}, {"outward": 0.007}))
+    assert isinstance(here, CutPlan) and isinstance(out, CutPlan)
+    less, more = (way_room(plan, (beside.start, beside.end)) for plan in (here, out))
+    assert here.along == 0.0 < out.along and more > less + 0.5 * out.along
+
+
+def test_a_cut_is_not_moved_along_its_wood_for_less_room_than_half_of_the_way():
+    """Canes all around, one of which leans: 5 mm farther out the blades have 1 mm more room beside it."""
+    low, high = ((POINT + [0.022 + 0.2 * z, 0.0, z]).tolist() for z in (-0.2, 0.3))
+    lines = (standing()[0], (tuple(low), tuple(high)))
+    around = [(0.045 * np.cos(angle), 0.045 * np.sin(angle)) for angle in np.linspace(0.6, 2.0 * np.pi - 0.6, 9)]
+    plan = find(tangent=(0.0, 0.0, 1.0), standing=lines + standing(*around)[1:], outward=0.007)
+    assert isinstance(plan, CutPlan) and plan.along == 0.0
+
+
+@pytest.mark.parametrize("towards", [1.0, -1.0])
 def test_blades_do_not_lean_into_what_the_bark_hides_of_the_cane_that_stays(towards):
     """It is seen from 14 mm beside the stub on, and comes out of it 16 mm below the cut."""
     whole = keeper(0.016, towards)
@@ -186,6 +213,17 @@ def test_where_canes_push_from_everywhere_the_cut_is_made_all_the_same():
     assert isinstance(find(standing=standing(*around)), CutPlan)
 
 
+def test_open_blades_have_the_room_that_is_between_them_and_a_cane():
+    clearance, plan = CutClearance(RobotModel(), SETTINGS), find(tangent=(0.0, 0.0, 1.0))
+    assert isinstance(plan, CutPlan)
+    cut = point("p1", tuple(POINT.tolist()), (0.0, 0.0, 1.0), vine=1, spur=1, cane=0)
+    rooms = []
+    for away in (0.040, 0.045):
+        clearance.update(None, standing((away, 0.0)))
+        rooms.append(clearance.beside(plan.poses, cut))
+    assert rooms[0] > 0.0 and rooms[1] - rooms[0] == pytest.approx(0.005, abs=2e-4)
+
+
 def test_the_cane_that_is_cut_and_those_far_away_push_nothing():
     free, beside = find(), find(standing=standing((0.12, 0.0)))
     np.testing.assert_array_equal(free.q_cut, beside.q_cut)
@@ -221,6 +259,21 @@ def test_a_posture_that_something_new_would_touch_does_not_fit_any_more():
     assert same.plan is not None and same.plan.approach == plan.approach and same.lacking is None
     assert other.lacking is not None and "link" in dict(other.lacking.values)["part"]
     assert other.plan is None or other.plan.approach != plan.approach
+
+
+@pytest.mark.parametrize("nearer", [(0.0, 0.0, -0.006), (0.006, 0.0, 0.0)])
+def test_a_stub_that_is_seen_nearer_to_the_cane_that_stays_is_cut_farther_out(nearer):
+    """There the open blades do not press it, which they would where it is seen."""
+    beside, along = keeper(0.022), (0.0, 0.0, 1.0)
+    search = among((beside,))
+    cut = point("p1", tuple(POINT.tolist()), along, vine=1, spur=1, cane=0, kind="renewal cut", outward=0.007)
+    q = np.zeros(12)
+    q[ARM_Q] = CONFIG.work.home
+    plan = completed(search.find(cut, q))
+    assert isinstance(plan, CutPlan) and plan.along == 0.0
+    there, moved = (completed(search.fit(plan, cut, POINT + by)) for by in (np.zeros(3), nearer))
+    assert there.plan is not None and there.plan.along == 0.0
+    assert moved.plan is not None and moved.plan.along > 0.0
 
 
 def room(plan, cane):

@@ -58,6 +58,18 @@ def test_later_cuts_are_rolled_out_later(monkeypatch) -> None:
     assert plan.duration == pytest.approx(1.5 * middle.ends_s)
 
 
+@pytest.mark.parametrize(("beside", "order"), [(0.02, ["stub", "cut"]), (0.1, ["cut", "stub"])])
+def test_a_stub_goes_first_where_the_blades_would_push_a_cane_beside_the_cut_above_it(beside, order) -> None:
+    """Such a cane often goes with the stub. The cut comes first on the way along the row."""
+    cut, stub = point("cut", 0.5, spur=4), point("stub", 0.54, 1.0, spur=4, kind="renewal cut")
+    canes = tuple(((x, 0.75, 0.9), (x, 0.75, 1.2)) for x in (0.5, 0.5 - beside, 0.5 + beside))
+    plan = PLANNER.plan(replace(request(cut, stub), canes=canes))
+    assert [each.point.point_id for each in plan.cuts] == order
+    elsewhere = point("cut", 0.5, spur=5)
+    plan = PLANNER.plan(replace(request(elsewhere, stub), canes=canes))
+    assert [each.point.point_id for each in plan.cuts] == ["cut", "stub"]
+
+
 def test_people_set_the_order() -> None:
     points = point("a", 0.2), point("b", 0.6), point("c", 1.0)
     plan = PLANNER.plan(replace(request(*points), order=("c", "a")))
