@@ -129,7 +129,7 @@ class Supervisor:
                 # Where the robot goes back after a contact, another cause ends that.
                 self._movement.stay()
                 touched = reason is self.health.contact
-                if touched and (told := self._movement.contact()) is not None:
+                if touched and (told := self._movement.stopped_by_contact()) is not None:
                     self._event_log.log(told)
                 self.event(Event.PROTECT, now, reason)
                 if touched:

@@ -154,7 +154,7 @@ class Movement:
         """Begin to bring the arm home."""
         self._homing = Homing(self._config, self.body.follower, self.body.dt)
 
-    def contact(self) -> m.Reason | None:
+    def stopped_by_contact(self) -> m.Reason | None:
         """A contact stops the robot: the cut that it was on the way to is put off. Returns what is logged of that."""
         touch, robot = self.body.contact.touch, self.body.measured
         return None if touch is None or robot is None else self.sequence.stopped_by(touch, robot.frame)

@@ -174,7 +174,7 @@ class Movement:
     def go_home(self):
         self._home = 30
 
-    def contact(self):
+    def stopped_by_contact(self):
         return self.sequence.stopped_by(self.body.contact.touch)
 
     def back_off(self):
