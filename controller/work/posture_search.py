@@ -157,7 +157,7 @@ _ALONG = (0.0, 0.0025, -0.0025, 0.005, -0.005, 0.007)
 _ANOTHER, _ENOUGH = 0.2, 0.03
 #: Room of the tool on the way in beside canes that would give way (m), which is enough: with less another approach is
 #: preferred, which may be slower and pass wires more closely.
-_BESIDE_ENOUGH = 0.005
+_BESIDE_ENOUGH = 0.003
 #: Room that a place farther along the wood has to bring, as a share of that distance.
 _WORTH = 0.5
 #: Most postures that are tried for a cut that is seen elsewhere than planned: the robot waits for them.
