@@ -681,7 +681,7 @@ class CutClearance:
         between the blades has none.
         """
         cut = poses.cut.translation
-        near = self._surroundings.canes_near(cut, _AROUND)
+        near = self._surroundings.canes_near(cut, _AROUND) if point.kind == "renewal cut" else ()
         staying = Axes(tuple(obstacle for capsule, obstacle in near if not _is_cut(capsule, point)))
         room = float(self._surroundings.model.tool_gaps((*poses.between, poses.cut), staying).min(initial=math.inf))
         gaps = self._axes.gaps(cut[None], np.zeros(1))[0]
