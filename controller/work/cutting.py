@@ -41,7 +41,7 @@ from controller.work.posture_search import (
 from controller.work.servo import CutServo
 from controller.work.step_result import StepResult
 from controller.work.survey import Survey
-from controller.work.tries import Tried
+from controller.work.tries import Line, Tried
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.messages.perception import ON_THE_WAY, CloseUpResult, CutSight
@@ -580,30 +580,25 @@ class MovingStage(TaskStage):
 
     def _another_time(self, robot: Measured, why: m.Reason) -> Step:
         """Leave the cut for a try from another side, after the others. The tool is still clear of the canes."""
-        parts, tried = self._parts, Tried(self._task.planned.approach)
-        told = parts.queue.put_off(self.point_id, tried, reasons.missed_once(why), why)
-        parts.next_cut.forget()
-        return Escape(parts), parts.brake(robot).with_event(told)
+        told = self.put_off(reasons.missed_once(why), why)
+        return Escape(self._parts), self._parts.brake(robot).with_event(told)
 
-    def put_off(self, touch: Touch, frame: MapFrame, again: m.Reason, why: m.Reason) -> m.Reason:
-        """Leave the cut for a try from another side, after the others, as something is in the way.
+    def put_off(self, again: m.Reason, why: m.Reason, met: Line | None = None) -> m.Reason:
+        """Leave the cut for a try from another side, after the others.
 
         Args:
-            touch: What is.
-            frame: Where odom is in map.
             again: Reason while the cut is to be tried again.
             why: Reason where this was the last try.
+            met: Axis of the cane in the way (m, map); None without one.
 
         Returns:
             What is logged.
         """
-        parts, cane = self._parts, None
-        if touch.axis is not None:
-            start, end = (vector3(frame.position_in_map(np.array(each))) for each in touch.axis)
-            cane = start, end
+        parts = self._parts
+        # Nothing that was found before leads to the next try.
         parts.next_cut.forget()
         parts.close_ups.forget(self.point_id)
-        return parts.queue.put_off(self.point_id, Tried(self._task.planned.approach, cane), again, why)
+        return parts.queue.put_off(self.point_id, Tried(self._task.planned.approach, met), again, why)
 
     def _retreat(self, robot: Measured) -> "Retreat":
         """Straight out of the canes, and on to the next cut where one is found."""
@@ -809,15 +804,20 @@ class Advance(MovingStage):
             return Cutting(parts, self._task, self._way), result
         if timeout.late(now):
             reason = missed("the cut", tracking)
-            tried = Tried(self._task.planned.approach)
-            told = parts.queue.put_off(self.point_id, tried, reasons.missed_once(reason), reason)
-            # Nothing that was found before leads to the next try.
-            parts.next_cut.forget()
+            told = self.put_off(reasons.missed_once(reason), reason)
             return self._retreat(robot), result.with_event(told)
         return self, result
 
 
 _WayIn = Travel | CloseUp | Fitting | Advance
+
+
+def _axis_in_map(touch: Touch, frame: MapFrame) -> Line | None:
+    """Axis of what was touched (m, map); None for something unknown."""
+    if touch.axis is None:
+        return None
+    start, end = (vector3(frame.position_in_map(np.array(each))) for each in touch.axis)
+    return start, end
 
 
 class Cutting(MovingStage):
@@ -1133,7 +1133,7 @@ class CutSequence:
             return reasons.cane_on_way_out(*what) if news else None
         parts.gave_way += 1
         self._stage = GivingWay(parts, contact, tuple(trail))
-        return stage.put_off(push, frame, reasons.cane_met(*what), reasons.cane_in_way(*what))
+        return stage.put_off(reasons.cane_met(*what), reasons.cane_in_way(*what), _axis_in_map(push, frame))
 
     def stopped_by(self, touch: Touch, frame: MapFrame) -> m.Reason | None:
         """A contact stops the robot. On the way to a cut it is put off, so that the next try comes from elsewhere.
@@ -1146,7 +1146,9 @@ class CutSequence:
             What is logged; None without news.
         """
         stage, why = self._stage, touch.reason
-        return stage.put_off(touch, frame, reasons.missed_once(why), why) if isinstance(stage, _WayIn) else None
+        if not isinstance(stage, _WayIn):
+            return None
+        return stage.put_off(reasons.missed_once(why), why, _axis_in_map(touch, frame))
 
     def hold(self) -> None:
         """Stand for one period in place of `step`. A close-up or a cut that was asked for goes on."""

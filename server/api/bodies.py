@@ -70,9 +70,9 @@ class SignInMethod(BaseModel):
 
 
 class Stop(_Body):
-    """The reason, for the log, and the id of the press, which a repeated request has again.
+    """The reason, for the log, and the id of the press. A repeated request has the same id.
 
-    Neither can make the stop fail: a reason is truncated if too long, and what is unreadable is ignored.
+    No body makes the stop fail. A reason that is too long is truncated, and what is unreadable is ignored.
     """
 
     reason: str = "software stop"

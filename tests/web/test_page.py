@@ -178,7 +178,7 @@ def test_a_stop_that_does_not_get_through_says_so(page: Page, server: PlayedServ
     server.answers["/api/stop"] = (500, {"ok": False, "reason": "something broke"})
     page.locator("#stop").click()
     until(page, lambda: len(server.stops()) == 6)
-    # The server knows by them what is one press, so that a late repetition does not stop again after a reset.
+    # One press has one id. By it the server does not stop again for a repetition that comes after the reset.
     presses = [stop["press"] for stop in server.stops()]
     assert (len(set(presses[:2])), len(set(presses[2:])), len(set(presses))) == (1, 1, 2)
 
