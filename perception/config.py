@@ -131,6 +131,7 @@ class TrackerConfig(Struct, frozen=True, forbid_unknown_fields=True):
         min_hits: Frames that must agree before a point is published.
         sparse_hits: Frames that suffice after `sparse_observations` of a spur, without a competing track.
         sparse_observations: See `sparse_hits`.
+        min_viewpoints: Viewpoints that must agree as well, or half of those that have shown the spur, if that is less.
         averaging_window: Frames that a running mean covers.
         position_tolerance: A point that moved farther gets a new revision (m).
         tangent_tolerance: The same for the tangent (rad).
@@ -144,6 +145,7 @@ class TrackerConfig(Struct, frozen=True, forbid_unknown_fields=True):
     min_hits: Count = 3
     sparse_hits: Count = 2
     sparse_observations: Count = 6
+    min_viewpoints: Count = 3
     averaging_window: Count = 20
     position_tolerance: Positive = 0.004
     tangent_tolerance: Positive = 0.15

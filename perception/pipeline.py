@@ -234,8 +234,7 @@ class Perception:
             proposals += [Proposal(cut, number) for cut in decision.cuts]
             aside = abs(float(view.R[:, 0] @ (spur.position - view.t)))
             self._update_undecided(number, spur, decision, in_front=aside < _IN_FRONT)
-        observations = {spur.number: spur.position.count for spur in self.plant_map.spurs}
-        self._apply(self._tracker.update(view, labels, proposals, observations))
+        self._apply(self._tracker.update(view, labels, proposals, numbers))
         self._update_obstacles(view, labels, cylinders, numbers)
         self._cane_lines = self.plant_map.cane_lines()
         self._site_messages = self._undecided_sites()

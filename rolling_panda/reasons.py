@@ -2031,6 +2031,11 @@ def withdrawn_as_elsewhere(point: str, vine: float, spur: float) -> None:
 
 
 @_reason("info", "")
+def withdrawn_as_unconfirmed(point: str, vine: float, spur: float) -> None:
+    """{point} (vine {vine:.0f}, spur {spur:.0f}) withdrawn: too few views from other sides show this cut."""
+
+
+@_reason("info", "")
 def perception_started() -> None:
     """Perception is up and waits for camera frames."""
 

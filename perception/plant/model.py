@@ -74,6 +74,15 @@ class Cane:
         return point
 
     @property
+    def origin(self) -> Array:
+        """Where it leaves the spur (3, m, odom): at arc length 0, straight back from the first point if that is beyond.
+
+        In the plant map that is a median over the frames, which see the first point higher or lower.
+        """
+        first = float(self.arc[0])
+        return self.at(0.0) if first <= 0.0 else self.base - first * self.tangent(first)
+
+    @property
     def length(self) -> float:
         """Arc length at the last axis point (m)."""
         return float(self.arc[-1])

@@ -151,8 +151,8 @@ def _prune_guyot(spur: Spur, config: RuleConfig, others: list[Array], keep_out: 
         return Decision(undecided=(spur.incomplete,))
     if len(spur.canes) != 2:
         return Decision(undecided=(reasons.not_two_canes(len(spur.canes)),))
-    lower, upper = sorted(spur.canes, key=lambda cane: float(cane.base[2]))
-    if float(upper.base[2] - lower.base[2]) < config.height_error:
+    lower, upper = sorted(spur.canes, key=lambda cane: float(cane.origin[2]))
+    if float(upper.origin[2] - lower.origin[2]) < config.height_error:
         return Decision(undecided=(reasons.canes_at_same_height(),))
     fruiting = replace(config, nodes_kept=config.fruiting_nodes)
     results = (
@@ -170,7 +170,7 @@ def choose_keeper(spur: Spur, config: RuleConfig) -> _Keeper | Reason:
         spur: At least one cane.
         config: Smallest diameter and measurement errors.
     """
-    canes = sorted((*spur.canes, *spur.hidden), key=lambda cane: (float(cane.base[2]), -cane.radius))
+    canes = sorted((*spur.canes, *spur.hidden), key=lambda cane: (float(cane.origin[2]), -cane.radius))
     if len(canes) == 1:
         return _Keeper(canes[0], "only", 1)
     margin = config.diameter_error / np.sqrt(min(config.max_averaged, *(cane.observations for cane in canes)))
@@ -184,7 +184,7 @@ def choose_keeper(spur: Spur, config: RuleConfig) -> _Keeper | Reason:
         if 2 * (keeper.radius - rival) < margin:
             return reasons.canes_equally_thin()
         return _Keeper(keeper, "thickest", len(canes))
-    clear = min((float(cane.base[2] - keeper.base[2]) for cane in thick if cane is not keeper), default=1.0)
+    clear = min((float(cane.origin[2] - keeper.origin[2]) for cane in thick if cane is not keeper), default=1.0)
     if clear < config.height_error:
         return reasons.canes_at_same_height()
     return _Keeper(keeper, "lowest", len(canes), float(np.clip(clear / (3 * config.height_error), 0.5, 1.0)))

@@ -2,11 +2,11 @@
 
 import copy
 import dataclasses
+import math
 from collections import Counter, deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from statistics import median_high
-from types import MappingProxyType
 
 import numpy as np
 from msgspec.structs import replace
@@ -30,6 +30,8 @@ _MAX_MISSES, _MAX_MISSES_UNPUBLISHED = 5, 20
 _SAME_OFFSET = 0.003
 #: Newest observations in the median of the offset.
 _OFFSETS = 7
+#: Camera positions nearer to each other than this are one viewpoint (m): what hides a cane hides it from all of them.
+_SAME_VIEWPOINT = 0.05
 #: Standard deviation of one observation, used as prior: depth (2.9 mm at 0.9 m, 0.08 px of a D435i) and half a pixel
 #: along the cane (m); direction of a few centimetres of axis (rad).
 _POSITION_NOISE, _DIRECTION_NOISE = 0.003, 0.05
@@ -57,6 +59,14 @@ class TrackerUpdate:
     severed: tuple[Array, ...]
 
 
+@dataclass
+class _Looks:
+    """Frames that have shown a spur, and their viewpoints, each a camera position (3, m, map)."""
+
+    frames: int = 0
+    viewpoints: list[Array] = field(default_factory=list)
+
+
 @dataclass(eq=False)
 class _Track:
     point_id: str
@@ -77,6 +87,8 @@ class _Track:
     """Covariance of single observations."""
     offsets: deque[float] = field(default_factory=lambda: deque(maxlen=_OFFSETS))
     """Newest offsets past the last kept node (m)."""
+    viewpoints: list[Array] = field(default_factory=list)
+    """Those of the frames that have proposed it (3, m, map)."""
 
     @classmethod
     def of(cls, point_id: str, proposal: Proposal) -> "_Track":
@@ -132,8 +144,9 @@ class Tracker:
         self._tracks: list[_Track] = []
         self._withdrawn: dict[str, m.PruningPoint] = {}
         self._last_id = 0
+        self._looks: dict[SpurNumber, _Looks] = {}
         self._last_revision: dict[str, int] = {}
-        """Newest revision of points that were restored to an older one."""
+        """Newest revision of points that were restored to an older one, or withdrawn for now."""
 
     def copy(self) -> "Tracker":
         """An independent copy."""
@@ -155,6 +168,8 @@ class Tracker:
                 if track.point_id in by_hand:
                     restored.append(by_hand.pop(track.point_id))
             elif track.site not in moved and stands(track.number, track.position):
+                # Frames since then had no say in it.
+                track.viewpoints = list(self._looks_at(track).viewpoints)
                 restored.append(track)
         self._tracks = [*restored, *by_hand.values()]
         published = {point.point_id: point for point in self.points()}
@@ -171,7 +186,7 @@ class Tracker:
         view: View,
         labels: Labels,
         proposals: list[Proposal],
-        observations: Mapping[SpurNumber, int] = MappingProxyType({}),
+        shown: Sequence[SpurNumber] = (),
     ) -> TrackerUpdate:
         """Add one frame.
 
@@ -179,9 +194,15 @@ class Tracker:
             view: The frame.
             labels: H×W class indices.
             proposals: Its proposed cuts.
-            observations: Of each spur so far.
+            shown: The spurs that it shows, with a proposal or without.
         """
         supported = self._associate(proposals)
+        for track in supported:
+            _add_viewpoint(track.viewpoints, view.t)
+        for number in shown:
+            looks = self._looks.setdefault(number, _Looks())
+            looks.frames += 1
+            _add_viewpoint(looks.viewpoints, view.t)
         competing: dict[Site, int] = {}
         for track in supported:
             competing[track.site] = max(competing.get(track.site, 0), track.hits)
@@ -190,6 +211,8 @@ class Tracker:
             reason = None if track in supported else self._withdrawal(track, view, labels, competing)
             if reason is None:
                 kept.append(track)
+                if track.published is not None and not self._confirmed(track):
+                    withdrawn.append(self._withdraw_for_now(track, track.published))
                 continue
             if track.gone >= self._config.gone_frames:
                 severed.append(track.position)
@@ -197,12 +220,13 @@ class Tracker:
                 self._withdrawn[track.point_id] = track.published
                 withdrawn.append(reason)
         self._tracks = kept
-        self._publish(supported, observations)
+        self._publish(supported)
         return TrackerUpdate(tuple(withdrawn), tuple(severed))
 
     def add(self, proposal: Proposal) -> m.PruningPoint:
-        """Publish a cut at once."""
+        """Publish a cut at once, as one that all viewpoints of its spur have shown."""
         track = self._start(proposal)
+        track.viewpoints = list(self._looks_at(track).viewpoints)
         track.published = self._message(track)
         return track.published
 
@@ -244,6 +268,7 @@ class Tracker:
             else:
                 published, track = track.published, _Track.of(track.point_id, proposal)
                 track.published = published
+            track.viewpoints = list(self._looks_at(track).viewpoints)
             track.published = self._message(track)
             self._tracks.append(track)
 
@@ -251,7 +276,7 @@ class Tracker:
         """Withdraw all points, since the camera has another calibration; returns the reason of each."""
         gone = [track.published for track in self._tracks if track.published is not None]
         self._withdrawn |= {point.point_id: point for point in gone}
-        self._tracks = []
+        self._tracks, self._looks = [], {}
         return tuple(reasons.withdrawn_for_calibration(point.point_id) for point in gone)
 
     def find(self, point_id: str) -> m.PruningPoint | None:
@@ -331,14 +356,30 @@ class Tracker:
             return reasons.withdrawn_as_elsewhere(track.point_id, track.number.vine, track.number.spur)
         return None
 
-    def _publish(self, supported: list[_Track], observations: Mapping[SpurNumber, int]) -> None:
+    def _looks_at(self, track: _Track) -> _Looks:
+        """Looks at the spur of a track."""
+        return self._looks.get(track.number, _Looks())
+
+    def _confirmed(self, track: _Track) -> bool:
+        """Whether enough of the viewpoints that have shown its spur have shown its cut; one by hand needs none."""
+        needed = min(self._config.min_viewpoints, math.ceil(len(self._looks_at(track).viewpoints) / 2))
+        return track.cut.kind == "by hand" or len(track.viewpoints) >= needed
+
+    def _withdraw_for_now(self, track: _Track, point: m.PruningPoint) -> m.Reason:
+        """Withdraw a point until other viewpoints confirm it; then it has a new revision."""
+        self._withdrawn[track.point_id] = point
+        self._last_revision[track.point_id] = max(point.revision, self._last_revision.get(track.point_id, 0))
+        track.published = None
+        return reasons.withdrawn_as_unconfirmed(track.point_id, track.number.vine, track.number.spur)
+
+    def _publish(self, supported: list[_Track]) -> None:
         tracks = Counter(track.site for track in self._tracks)
         published = {track.site for track in self._tracks if track.published is not None} | self._moved()
         for track in self._tracks:
             if track.published is None:
-                sparse = observations.get(track.number, 0) >= self._config.sparse_observations
+                sparse = self._looks_at(track).frames >= self._config.sparse_observations
                 needed = self._config.sparse_hits if sparse and tracks[track.site] == 1 else self._config.min_hits
-                if track.site in published or track.hits < needed:
+                if track.site in published or track.hits < needed or not self._confirmed(track):
                     continue
             elif track not in supported:
                 continue
@@ -353,9 +394,10 @@ class Tracker:
         """The message of a point; kind and pose of the cut change only together with the revision."""
         old, cut = track.published, track.cut
         count = min(track.hits, self._config.averaging_window)
+        last_revision = self._last_revision.get(track.point_id, 0)
         point = m.PruningPoint(
             point_id=track.point_id,
-            revision=1,
+            revision=1 + last_revision,
             position=vector3(track.position),
             tangent=vector3(track.tangent),
             radius=float(track.radius),
@@ -380,7 +422,7 @@ class Tracker:
             point = replace(
                 point,
                 # A revision is never used twice.
-                revision=old.revision if same else 1 + max(old.revision, self._last_revision.get(track.point_id, 0)),
+                revision=old.revision if same else 1 + max(old.revision, last_revision),
                 position=old.position if same else point.position,
                 tangent=old.tangent if same else point.tangent,
             )
@@ -392,6 +434,12 @@ class Tracker:
         shifted = abs((new.offset or 0.0) - (old.offset or 0.0))
         same_pose = moved <= self._config.position_tolerance and turned <= self._config.tangent_tolerance
         return identity(new) == identity(old) and same_pose and shifted < _SAME_OFFSET
+
+
+def _add_viewpoint(viewpoints: list[Array], position: Array) -> None:
+    """Add a camera position (3, m, map), unless it is one of these viewpoints."""
+    if all(distance(position, other) >= _SAME_VIEWPOINT for other in viewpoints):
+        viewpoints.append(position)
 
 
 def position_covariance(scatter: Array, count: int) -> Array:

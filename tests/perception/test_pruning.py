@@ -93,6 +93,21 @@ def test_a_cane_that_this_picture_hides_counts_in_the_choice():
     assert only.kind == "spur cut" and only.reason.code == "spur_cut_lowest"
 
 
+def test_the_lowest_cane_is_lowest_where_it_leaves_the_spur_not_where_a_picture_first_shows_it():
+    upper = cane(base=(0.02, 0.0, 1.03))
+    lower = cane()
+    # The picture shows the lower one from 50 mm on, and it leans to the side.
+    begin = lower.arc >= 0.05
+    leaning = lower.axis + np.outer(0.2 * lower.arc, [1.0, 0.0, 0.0])
+    hidden = replace(lower, axis=leaning[begin], arc=lower.arc[begin])
+    assert hidden.base[2] > upper.base[2] and hidden.origin == pytest.approx([0.0, 0.0, 1.0], abs=2e-3)
+    assert choose_keeper(spur(upper, hidden), RULE).cane is hidden
+    # Where it is seen from farther down than by other pictures, those tell.
+    early = lower.shifted(-0.04)
+    assert early.origin == pytest.approx([0.0, 0.0, 1.04], abs=1e-6)
+    assert choose_keeper(spur(upper, early), RULE).cane is upper
+
+
 def test_a_choice_within_the_noise_is_no_choice():
     doubtful = cane(radius=0.00305, base=(0.02, 0.0, 0.93))
     assert choose_keeper(spur(doubtful, cane(base=(0.0, 0.0, 0.99))), RULE) == reasons.low_cane_near_limit()

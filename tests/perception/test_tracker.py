@@ -40,6 +40,21 @@ class Fed(NamedTuple):
     severed: tuple
 
 
+def look_from(place, *cuts):
+    """What a look shows of spur 1 from a place behind the first one (m)."""
+    image = replace(view(depth=0.8 + place), t=np.array([0.0, 0.0, -place]))
+    return image, list(cuts)
+
+
+def survey(tracker, *looks):
+    """What is shown after each look, and what each has withdrawn."""
+    shown, withdrawn = [], []
+    for image, cuts in looks:
+        withdrawn += tracker.update(image, image.labels, cuts, [SpurNumber(1, 1)]).withdrawn
+        shown.append(tracker.points())
+    return shown, withdrawn
+
+
 def feed(tracker, image, *proposals):
     update = tracker.update(image, image.labels, list(proposals))
     return Fed(tracker.points(), update.withdrawn, update.severed)
@@ -98,22 +113,78 @@ def test_a_point_is_where_it_says_it_is_also_after_a_small_step_along_its_intern
 
 
 def test_after_many_looks_two_that_agree_are_enough_where_none_disagrees():
-    def survey(*others):
-        tracker, number = Tracker(CONFIG), SpurNumber(1, 1)
-        for look, said in enumerate((proposal(), None, *others, None, None, proposal(), None), 1):
-            cuts = [] if said is None else [said]
-            tracker.update(view(), view().labels, cuts, {number: look})
-            points = tracker.points()
-        return look, points
+    def seen(*others):
+        said = (proposal(), None, *others, None, None, proposal(), None)
+        shown, _ = survey(Tracker(CONFIG), *[look_from(0.0, *([] if cut is None else [cut])) for cut in said])
+        return len(shown), shown[-1]
 
-    looks, points = survey(None, None)
+    looks, points = seen(None, None)
     assert looks >= CONFIG.sparse_observations and len(points) == CONFIG.sparse_hits - 1 == 1
-    assert survey()[1] and survey()[0] >= CONFIG.sparse_observations
-    assert not survey(proposal(y=0.06), None)[1], "another look put the cut elsewhere"
+    assert seen()[1] and seen()[0] >= CONFIG.sparse_observations
+    assert not seen(proposal(y=0.06), None)[1], "another look put the cut elsewhere"
     tracker = Tracker(CONFIG)
     for _ in range(2):
         early = feed(tracker, view(), proposal()).points
     assert not early, "two looks are not many"
+
+
+def test_looks_from_one_place_are_one_viewpoint_where_others_do_not_show_the_cut():
+    elsewhere = [look_from(0.1 * k) for k in range(1, 6)]
+    alone, _ = survey(Tracker(CONFIG), *elsewhere, *[look_from(0.0, proposal())] * 20)
+    assert not any(alone)
+    # A step of a centimetre is no other viewpoint.
+    beside, _ = survey(Tracker(CONFIG), *elsewhere, *[look_from(0.01 * k, proposal()) for k in range(4)])
+    assert not any(beside)
+    three, _ = survey(Tracker(CONFIG), *elsewhere, *[look_from(0.1 * k, proposal()) for k in range(3)])
+    assert [len(points) for points in three[-3:]] == [0, 0, 1]
+    # While the robot stands there is one viewpoint, and it is enough.
+    standing, _ = survey(Tracker(CONFIG), *[look_from(0.0, proposal())] * CONFIG.min_hits)
+    assert len(standing[-1]) == 1
+
+
+def test_a_point_that_other_viewpoints_do_not_show_is_withdrawn_until_they_do():
+    tracker = Tracker(CONFIG)
+    _, withdrawn = survey(tracker, *[look_from(0.0, proposal())] * 3, look_from(0.1))
+    (before,) = tracker.points()
+    assert not withdrawn, "one of two viewpoints shows it"
+    _, withdrawn = survey(tracker, look_from(0.2))
+    assert withdrawn == [reasons.withdrawn_as_unconfirmed(before.point_id, 1, 1)] and not tracker.points()
+    assert tracker.find(before.point_id) == before
+    survey(tracker, look_from(0.3, proposal()))
+    (after,) = tracker.points()
+    assert (after.point_id, after.revision) == (before.point_id, before.revision + 1)
+    assert after.digest != before.digest, "an acceptance of the first one does not hold"
+
+
+def test_viewpoints_withdraw_neither_a_point_by_hand_nor_what_a_new_rule_makes_of_all_frames():
+    tracker, by_hand = Tracker(CONFIG), proposal(y=0.1)
+    tracker.add(replace(by_hand, cut=replace(by_hand.cut, kind="by hand")))
+    around = [look_from(0.1 * k) for k in range(9)]
+    survey(tracker, *around[:5])
+    for cut in (proposal(), proposal(y=0.01)):
+        tracker.reset([cut])
+        shown, withdrawn = survey(tracker, *around)
+        assert {point.kind for point in shown[-1]} == {"by hand", "spur cut"} and not withdrawn
+
+
+def test_viewpoints_of_a_rule_that_was_undone_do_not_count_against_a_point():
+    tracker = Tracker(CONFIG)
+    survey(tracker, *[look_from(0.0, proposal())] * CONFIG.min_hits)
+    before = tracker.copy()
+    tracker.reset([])
+    around = [look_from(0.1 * k) for k in range(1, 6)]
+    survey(tracker, *around)
+    tracker.restore(before, lambda number, position: True)
+    shown, withdrawn = survey(tracker, *around)
+    assert len(shown[-1]) == 1 and not withdrawn
+
+
+def test_with_another_calibration_earlier_viewpoints_do_not_count():
+    tracker = Tracker(CONFIG)
+    survey(tracker, *[look_from(0.1 * k) for k in range(1, 6)])
+    tracker.withdraw_all()
+    shown, _ = survey(tracker, *[look_from(0.0, proposal())] * CONFIG.min_hits)
+    assert len(shown[-1]) == 1
 
 
 def test_looks_that_say_nothing_do_not_make_it_forget_what_few_have_said():
