@@ -55,4 +55,7 @@ def draw_world(folder: Path, figure: Figure) -> None:
         panel.set_ylim(-3, 103)
     for panel in panels[len(names) :]:
         panel.set_visible(False)
+    # The lowest panel of each column names the levels, also above an empty place.
+    for panel in panels[max(len(names) - _COLUMNS, 0) : len(names)]:
+        panel.tick_params(labelbottom=True)
     figure.supylabel("accepted cuts that are right (%)", fontsize=10)
