@@ -813,7 +813,7 @@ _WayIn = Travel | CloseUp | Fitting | Advance
 
 
 def _axis_in_map(touch: Touch, frame: MapFrame) -> Line | None:
-    """Axis of what was touched (m, map); None for something unknown."""
+    """Axis of the wood that was touched (m, map); None where it is unknown."""
     if touch.axis is None:
         return None
     start, end = (vector3(frame.position_in_map(np.array(each))) for each in touch.axis)

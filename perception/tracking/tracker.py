@@ -3,7 +3,7 @@
 import copy
 import dataclasses
 import math
-from collections import Counter, deque
+from collections import Counter, defaultdict, deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from statistics import median_high
@@ -144,7 +144,7 @@ class Tracker:
         self._tracks: list[_Track] = []
         self._withdrawn: dict[str, m.PruningPoint] = {}
         self._last_id = 0
-        self._looks: dict[SpurNumber, _Looks] = {}
+        self._looks: defaultdict[SpurNumber, _Looks] = defaultdict(_Looks)
         self._last_revision: dict[str, int] = {}
         """Newest revision of points that were restored to an older one, or withdrawn for now."""
 
@@ -168,8 +168,7 @@ class Tracker:
                 if track.point_id in by_hand:
                     restored.append(by_hand.pop(track.point_id))
             elif track.site not in moved and stands(track.number, track.position):
-                # Frames since then had no say in it.
-                track.viewpoints = list(self._looks_at(track).viewpoints)
+                self._credit_all_viewpoints(track)
                 restored.append(track)
         self._tracks = [*restored, *by_hand.values()]
         published = {point.point_id: point for point in self.points()}
@@ -200,7 +199,7 @@ class Tracker:
         for track in supported:
             _add_viewpoint(track.viewpoints, view.t)
         for number in shown:
-            looks = self._looks.setdefault(number, _Looks())
+            looks = self._looks[number]
             looks.frames += 1
             _add_viewpoint(looks.viewpoints, view.t)
         competing: dict[Site, int] = {}
@@ -226,7 +225,7 @@ class Tracker:
     def add(self, proposal: Proposal) -> m.PruningPoint:
         """Publish a cut at once, as one that all viewpoints of its spur have shown."""
         track = self._start(proposal)
-        track.viewpoints = list(self._looks_at(track).viewpoints)
+        self._credit_all_viewpoints(track)
         track.published = self._message(track)
         return track.published
 
@@ -268,7 +267,7 @@ class Tracker:
             else:
                 published, track = track.published, _Track.of(track.point_id, proposal)
                 track.published = published
-            track.viewpoints = list(self._looks_at(track).viewpoints)
+            self._credit_all_viewpoints(track)
             track.published = self._message(track)
             self._tracks.append(track)
 
@@ -276,7 +275,8 @@ class Tracker:
         """Withdraw all points, since the camera has another calibration; returns the reason of each."""
         gone = [track.published for track in self._tracks if track.published is not None]
         self._withdrawn |= {point.point_id: point for point in gone}
-        self._tracks, self._looks = [], {}
+        self._tracks = []
+        self._looks.clear()
         return tuple(reasons.withdrawn_for_calibration(point.point_id) for point in gone)
 
     def find(self, point_id: str) -> m.PruningPoint | None:
@@ -356,13 +356,13 @@ class Tracker:
             return reasons.withdrawn_as_elsewhere(track.point_id, track.number.vine, track.number.spur)
         return None
 
-    def _looks_at(self, track: _Track) -> _Looks:
-        """Looks at the spur of a track."""
-        return self._looks.get(track.number, _Looks())
+    def _credit_all_viewpoints(self, track: _Track) -> None:
+        """Count every viewpoint of its spur for a cut that was not proposed frame by frame under the present rule."""
+        track.viewpoints = list(self._looks[track.number].viewpoints)
 
     def _confirmed(self, track: _Track) -> bool:
         """Whether enough of the viewpoints that have shown its spur have shown its cut; one by hand needs none."""
-        needed = min(self._config.min_viewpoints, math.ceil(len(self._looks_at(track).viewpoints) / 2))
+        needed = min(self._config.min_viewpoints, math.ceil(len(self._looks[track.number].viewpoints) / 2))
         return track.cut.kind == "by hand" or len(track.viewpoints) >= needed
 
     def _withdraw_for_now(self, track: _Track, point: m.PruningPoint) -> m.Reason:
@@ -377,7 +377,7 @@ class Tracker:
         published = {track.site for track in self._tracks if track.published is not None} | self._moved()
         for track in self._tracks:
             if track.published is None:
-                sparse = self._looks_at(track).frames >= self._config.sparse_observations
+                sparse = self._looks[track.number].frames >= self._config.sparse_observations
                 needed = self._config.sparse_hits if sparse and tracks[track.site] == 1 else self._config.min_hits
                 if track.site in published or track.hits < needed or not self._confirmed(track):
                     continue

@@ -72,7 +72,7 @@ class SignInMethod(BaseModel):
 class Stop(_Body):
     """The reason, for the log, and the id of the press. A repeated request has the same id.
 
-    No body makes the stop fail. A reason that is too long is truncated, and what is unreadable is ignored.
+    The stop does not depend on its body: a long reason is truncated, and an unreadable one is ignored.
     """
 
     reason: str = "software stop"

@@ -102,6 +102,8 @@ def test_the_lowest_cane_is_lowest_where_it_leaves_the_spur_not_where_a_picture_
     hidden = replace(lower, axis=leaning[begin], arc=lower.arc[begin])
     assert hidden.base[2] > upper.base[2] and hidden.origin == pytest.approx([0.0, 0.0, 1.0], abs=2e-3)
     assert choose_keeper(spur(upper, hidden), RULE).cane is hidden
+    level = cane(base=(0.02, 0.0, 1.0))
+    assert choose_keeper(spur(level, hidden), RULE) == reasons.canes_at_same_height()
     # Where it is seen from farther down than by other pictures, those tell.
     early = lower.shifted(-0.04)
     assert early.origin == pytest.approx([0.0, 0.0, 1.04], abs=1e-6)
@@ -353,6 +355,17 @@ def test_the_lower_cane_keeps_two_nodes_and_the_upper_one_eight():
     np.testing.assert_allclose(long.position, [0.06, 0.0, 0.93 + 0.66 + 0.02], atol=1e-9)
     assert decision.undecided == (reasons.old_cane_left(),)
     assert [cut.reason.code for cut in decision.cuts] == ["guyot_cut_lower", "guyot_cut_upper"]
+
+
+def test_the_lower_cane_of_a_guyot_vine_is_the_one_that_leaves_the_head_lower():
+    begin = LOWER.arc >= 0.05
+    hidden = replace(LOWER, axis=LOWER.axis[begin], arc=LOWER.arc[begin])
+    assert hidden.base[2] > UPPER.base[2]
+    short, long = apply_rule(guyot_spur(UPPER, hidden), GUYOT).cuts
+    assert short.position[0] == LOWER.base[0] and long.position[0] == UPPER.base[0]
+    # Seen from different places on, but from the same height of the head.
+    level = replace(UPPER, axis=UPPER.axis - [0.0, 0.0, 0.03])
+    assert reasons.canes_at_same_height() in apply_rule(guyot_spur(level, hidden), GUYOT).undecided
 
 
 def test_the_operators_numbers_of_nodes_are_kept():
