@@ -7,6 +7,7 @@ how it moves, the queue what is cut. `Controller` calls them in order for each p
 import functools
 import math
 from collections.abc import Callable, Iterable
+from typing import Literal
 
 import msgspec
 
@@ -279,9 +280,10 @@ class Controller:
             intents.CalibrateCamera: functools.partial(self._look_around, CALIBRATION),
             intents.CheckCamera: functools.partial(self._look_around, CHECK),
             intents.CalibrateBase: lambda asked, now: self._begin(asked, now, self._movement.sequence.drive_around),
-            intents.UseBase: self._use_base,
+            intents.UseBase: functools.partial(self._use, "base", reasons.no_base_offered),
             intents.CalibrateArm: functools.partial(self._look_around, ARM),
-            intents.UseArm: self._use_arm,
+            intents.UseArm: functools.partial(self._use, "arm", reasons.no_arm_offered),
+            intents.UseTiming: functools.partial(self._use, "timing", reasons.no_timing_offered),
             intents.Pause: self._pause,
             intents.Home: self._home,
             intents.Reset: lambda asked, now: self._supervisor.stops.ask_release(asked, self._supervisor.bridge, now),
@@ -412,20 +414,18 @@ class Controller:
         found = self._inbox.newest(RobotCalibration)
         return RobotCalibration(header=m.Header()) if found is None else found.message
 
-    def _use_base(self, asked: intents.UseBase, now: float) -> m.Reason | None:
+    def _use(
+        self,
+        part: Literal["base", "arm", "timing"],
+        none: Callable[[], m.Reason],
+        asked: intents.UseBase | intents.UseArm | intents.UseTiming,
+        now: float,
+    ) -> m.Reason | None:
         """Have the bridge use the calibration that the operator saw; its log tells what becomes of it."""
-        base = self._offers.base
-        if base is None or base.made_at != asked.made_at:
-            return reasons.no_base_offered()
-        self._calibration_due = m.UseCalibration(user=asked.user, base=base)
-        return None
-
-    def _use_arm(self, asked: intents.UseArm, now: float) -> m.Reason | None:
-        """The same of the arm."""
-        arm = self._offers.arm
-        if arm is None or arm.made_at != asked.made_at:
-            return reasons.no_arm_offered()
-        self._calibration_due = m.UseCalibration(user=asked.user, arm=arm)
+        offer = getattr(self._offers, part)
+        if offer is None or offer.made_at != asked.made_at:
+            return none()
+        self._calibration_due = m.UseCalibration(user=asked.user, **{part: offer})
         return None
 
     def _begin(self, asked: intents.Intent, now: float, work: Callable[[], None]) -> m.Reason | None:

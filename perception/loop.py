@@ -135,7 +135,7 @@ class PerceptionProcess:
         self._camera_told: CameraState | None = None
         self._localisation_sent = -1e9
         self._localisation_told: Localisation | None = None
-        self._calibration = perception.calibrator.state
+        self._calibration = perception.robot_calibration
         self._calibration_told: RobotCalibration | None = None
         self._obstacles_sent = self._picture_sent = self._rejected_logged = -1e9
         self._started = False
@@ -299,5 +299,5 @@ def _work(
         reply,
         perception.camera.state,
         perception.localisation,
-        perception.calibrator.state,
+        perception.robot_calibration,
     )

@@ -57,6 +57,7 @@ from rolling_panda.messages.perception import (
     CloseUpResult,
     CutSight,
     Localisation,
+    RobotCalibration,
     SpurPicture,
 )
 from rolling_panda.messages.robot import CameraFrame
@@ -173,7 +174,7 @@ class Perception:
         self.camera_rays.add(frame)
         self.row_frame.predict(_base(frame), view.stamp, _inertial(frame))
         self.withdrawn = ()
-        if self.camera.follow(frame.joint_offsets):
+        if self.camera.follow(frame.joint_offsets, frame.delay):
             self._forget()
         # The calibration's board hides the row. On the way to a cut other pictures would come too late.
         if frame.point_id.startswith((CALIBRATION, BASE, ARM, ON_THE_WAY)) or -view.R[2, 1] < self._config.min_upright:
@@ -336,6 +337,11 @@ class Perception:
     def obstacles(self) -> tuple[Capsule, ...]:
         """Obstacle map with the retained canes, in map; the same object while there is no news."""
         return self._wood
+
+    @property
+    def robot_calibration(self) -> RobotCalibration:
+        """What pictures tell of the robot itself."""
+        return replace(self.calibrator.state, timing=self.camera.timing)
 
     @property
     def localisation(self) -> Localisation:

@@ -401,6 +401,16 @@ class UseArm(Intent, frozen=True, kw_only=True):
     made_at: WallTime
 
 
+class UseTiming(Intent, frozen=True, kw_only=True):
+    """Use the new calibration of the camera's clock from now on. It moves nothing.
+
+    Attributes:
+        made_at: `made_at` of the calibration that the operator saw.
+    """
+
+    made_at: WallTime
+
+
 class Pause(Intent, frozen=True, kw_only=True):
     """AUTO or TELEOP → PAUSED."""
 
@@ -609,6 +619,7 @@ COMMANDS: Final[tuple[Command, ...]] = (
     Command(UseBase, "mode", "/base/use", modes=("IDLE", "READY", "PAUSED")),
     Command(CalibrateArm, "mode", "/arm/calibrate", control=True, event=Event.START, conditions=_WATCHED_MOTION),
     Command(UseArm, "mode", "/arm/use", modes=("IDLE", "READY", "PAUSED")),
+    Command(UseTiming, "mode", "/timing/use", modes=("IDLE", "READY", "PAUSED")),
     Command(Pause, "mode", "/pause", event=Event.PAUSE),
     Command(Resume, "mode", "/resume", control=True, event=Event.RESUME),
     Command(

@@ -2587,6 +2587,16 @@ def no_base_offered() -> None:
     """There is no new calibration of the base to use."""
 
 
+@_reason("info", "let the robot survey some metres")
+def no_timing_offered() -> None:
+    """There is no new calibration of the camera's clock to use."""
+
+
+@_reason("info", "")
+def timing_calibration_used(delay: float) -> None:
+    """The camera clock's new calibration is in use: pictures are exposed {delay:.0f} ms later than their times tell."""
+
+
 @_reason("warning", "let the robot come to rest, and use it again")
 def calibration_in_motion() -> None:
     """A calibration is taken into use at rest only."""
@@ -2662,12 +2672,12 @@ def camera_looks_down(angle: float, sd: float) -> None:
     """The camera looks {angle:.1f}° (± {sd:.1f}°) below where it was calibrated."""
 
 
-@_reason("warning", "points seen in motion are off; add it to frame_time_offset")
+@_reason("warning", "points seen in motion are off; use the camera clock's new calibration on the screen Engineer")
 def frames_late(offset: float, interval: float) -> None:
     """Camera pictures are {offset:.0f} ms (± {interval:.0f} ms) later than their times tell."""
 
 
-@_reason("warning", "points seen in motion are off; take it from frame_time_offset")
+@_reason("warning", "points seen in motion are off; use the camera clock's new calibration on the screen Engineer")
 def frames_early(offset: float, interval: float) -> None:
     """Camera pictures are {offset:.0f} ms (± {interval:.0f} ms) earlier than their times tell."""
 

@@ -147,6 +147,7 @@ class RowRobot:
             position=posture.position,
             velocity=posture.velocity,
             attitude=posture.attitude,
+            delay=offset,
         )
 
     def close(self) -> None:

@@ -132,9 +132,8 @@ class BridgeCore:
         self._draw = draw
         self._faults = RobotFaults(draw)
         self._orders = CutOrders(cuts)
-        self._camera_trigger = CameraTrigger(
-            config.camera_moving_hz, config.camera_resting_hz, TICK_S, config.frame_time_offset
-        )
+        self._configured_delay = config.frame_time_offset
+        self._camera_trigger = CameraTrigger(config.camera_moving_hz, config.camera_resting_hz, TICK_S)
         self._pace = TimeRatio()
         self._ticks = 0
         self._joint_ticks = round(1 / config.joints_hz / TICK_S)
@@ -259,7 +258,7 @@ class BridgeCore:
         refused = None
         if bool(np.any(self._limiter.sent)):
             refused = reasons.calibration_in_motion()
-        elif (asked := request.base or request.arm) is not None:
+        elif (asked := request.base or request.arm or request.timing) is not None:
             refused = self._calibration.request(asked)
         return m.Answer(ok=refused is None, reason=refused)
 
@@ -440,6 +439,7 @@ class BridgeCore:
             moving=moving,
             base=self._calibration.base,
             arm=self._calibration.arm,
+            timing=self._calibration.timing,
         )
 
     def _watch_mode(self, moving: bool, now: float) -> None:
@@ -451,6 +451,12 @@ class BridgeCore:
             self._unwanted_said = True
             told = reasons.moved_without_mode() if mode not in _STILL else reasons.moved_in_mode(str(mode))
             self._log(told)
+
+    @property
+    def _delay(self) -> float:
+        """By how much pictures are exposed later than their times tell (s)."""
+        timing = self._calibration.timing
+        return self._configured_delay if timing is None else timing.delay
 
     def _frame(self, now: float) -> CameraFrame | None:
         measured: Measurement = self._measured
@@ -471,7 +477,7 @@ class BridgeCore:
         if expose:
             self._camera_trigger.exposed(self._ticks, posture)
         picture = self.robot.capture(expose)
-        return None if picture is None else self._camera_trigger.frame(picture)
+        return None if picture is None else self._camera_trigger.frame(picture, self._delay)
 
     def _scenery_message(self, scenery: SceneryOf, now: float) -> Scenery | None:
         """What stands around, when it has changed."""

@@ -1,8 +1,9 @@
-"""Calibrated wheels and joints: everything above the bridge sees a robot as drawn, whatever the real one is like.
+"""Calibrated wheels, joints and camera clock: above the bridge the robot is as drawn, whatever the real one is like.
 
 Angles of the real wheels are turned into those that wheels as drawn would have turned by on the same way of the base,
 and commands the other way. The offset of each joint's encoder is taken from its angle; a velocity has none. Odometry,
-postures and commands thus agree with the world, and no other process has to know.
+postures and commands thus agree with the world, and no other process has to know. A camera frame gets the posture of
+when it was exposed.
 """
 
 from collections.abc import Callable
@@ -49,12 +50,16 @@ class Calibration:
         self._pending: tuple[m.AnyCalibration, Future[None]] | None = None
         self.base: m.BaseCalibration | None = None
         self.arm: m.ArmCalibration | None = None
+        self.timing: m.FrameTiming | None = None
         self._take(calibrated.base)
         self._take(calibrated.arm)
+        self._take(calibrated.timing)
 
     def _take(self, calibration: m.AnyCalibration | None) -> None:
         if isinstance(calibration, m.BaseCalibration):
             self.base = calibration
+        elif isinstance(calibration, m.FrameTiming):
+            self.timing = calibration
         elif calibration is not None:
             self.arm = calibration
         base = self.base
@@ -131,6 +136,8 @@ class Calibration:
         self._pending = None
         before, offsets = self._used, self._offsets
         self._take(calibration)
+        if isinstance(calibration, m.FrameTiming):
+            return reasons.timing_calibration_used(1e3 * calibration.delay)
         if isinstance(calibration, m.ArmCalibration):
             return reasons.arm_calibration_used(float(np.degrees(np.abs(self._offsets - offsets).max())))
         radius = (self._used.left + self._used.right) / (before.left + before.right)

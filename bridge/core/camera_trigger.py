@@ -30,16 +30,14 @@ class Posture(NamedTuple):
 class CameraTrigger:
     """Triggers frames, one at a time: at the moving rate while awake, else at the resting rate. Counts in ticks."""
 
-    def __init__(self, moving_hz: float, resting_hz: float, tick_s: float, offset: float = 0.0) -> None:
+    def __init__(self, moving_hz: float, resting_hz: float, tick_s: float) -> None:
         """Start awake, with the first picture due at once.
 
         Args:
             moving_hz: Rate while awake.
             resting_hz: Rate otherwise.
             tick_s: Length of a tick (s).
-            offset: By how much pictures are exposed later than their times tell (s).
         """
-        self._offset = offset
         self._moving = round(1 / moving_hz / tick_s)
         self._resting = round(1 / resting_hz / tick_s)
         self._awake = round(_AWAKE_S / tick_s)
@@ -77,8 +75,13 @@ class CameraTrigger:
         self._waiting = (posture, self._wanted)
         self._wanted = None
 
-    def frame(self, picture: Picture) -> CameraFrame | None:
-        """The message for the picture of the last exposure; None for an exposure without a request."""
+    def frame(self, picture: Picture, delay: float = 0.0) -> CameraFrame | None:
+        """The message for the picture of the last exposure; None for an exposure without a request.
+
+        Args:
+            picture: As the camera gave it.
+            delay: By how much it was exposed later than its time tells (s).
+        """
         if self._waiting is None:
             return None
         posture, wanted = self._waiting
@@ -86,8 +89,8 @@ class CameraTrigger:
         taken_at = picture.taken_at
         if taken_at is not None and self._postures:
             posture = min(self._postures, key=lambda known: abs(known.clock - taken_at))
-        if self._offset != 0.0 and self._postures:
-            true = posture.header.stamp + self._offset
+        if delay != 0.0 and self._postures:
+            true = posture.header.stamp + delay
             posture = min(self._postures, key=lambda known: abs(known.header.stamp - true))
         self._sequence += 1
         return CameraFrame(
@@ -106,4 +109,5 @@ class CameraTrigger:
             joint_offsets=posture.joint_offsets,
             velocity=posture.velocity,
             attitude=posture.attitude,
+            delay=delay,
         )

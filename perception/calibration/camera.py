@@ -19,7 +19,7 @@ from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.calibration.file import FARTHEST_SHIFT, FARTHEST_TURN, OLD_S
 from rolling_panda.messages.perception import CALIBRATION, CameraMount, CameraState, CloseUpResult
-from rolling_panda.messages.robot import NO_OFFSETS, CameraFrame, JointOffsets
+from rolling_panda.messages.robot import LARGEST_DELAY, NO_OFFSETS, CameraFrame, FrameTiming, JointOffsets
 from rolling_panda.model.robot import RobotModel, configuration, mount_pose, pose_message, turn_and_shift
 from rolling_panda.model.wire_values import vector3
 
@@ -50,6 +50,9 @@ class CameraCalibration:
         self._views: dict[str, BoardView] = {}
         self._stamp = 0.0
         self._monitor = MountMonitor()
+        self._delay: float | None = None
+        self.timing: FrameTiming | None = None
+        """A better calibration of the camera's clock, which the bridge can use; None without one."""
         self._use(mount)
 
     @property
@@ -96,18 +99,27 @@ class CameraCalibration:
             reason=reasons.board_not_in_picture() if found is None else None,
         )
 
-    def follow(self, offsets: JointOffsets) -> bool:
-        """The robot now takes these offsets from what the arm's encoders tell; whether it took others before.
+    def follow(self, offsets: JointOffsets, delay: float = 0.0) -> bool:
+        """The calibrations that the bridge now uses; whether it used others before, so that what was seen is off.
 
         A camera that was measured together with these offsets is offered from now on; nothing else that was measured
         before fits.
+
+        Args:
+            offsets: Taken from what the arm's encoders tell (rad).
+            delay: By how much pictures are taken to be later than their times tell (s).
         """
+        late, self._delay = self._delay, delay
+        retimed = late is not None and late != delay
+        if retimed:
+            self.timing = None
+            self._monitor.forget_time()
         before, self._offsets = self._offsets, offsets
         if before is None or before == offsets:
-            return False
+            return retimed
         fits = self._with_arm is not None and self._with_arm.joint_offsets == offsets
         self._offer, self._with_arm, self._refused = self._with_arm if fits else None, None, None
-        self._views = {}
+        self._views, self.timing = {}, None
         self._monitor.forget()
         return True
 
@@ -127,12 +139,14 @@ class CameraCalibration:
             frame: The frame that it is from.
             axes: Centre line of each cane from its base outwards, N×3 in odom (m).
         """
-        before = self._monitor.error
+        before, timed = self._monitor.error, self._monitor.time
         base, velocity = np.array([frame.base.x, frame.base.y, frame.base.phi]), None
         if frame.velocity is not None:
             q = configuration(frame.base, frame.position)
             velocity = self._model.velocity(q, np.array(frame.velocity), self._model.camera_id)
         self._monitor.observe(view.R, view.t, base, axes, velocity, view.stamp)
+        if self._monitor.time is not timed:
+            self.timing = self._timing()
         error = self._monitor.error
         if error is before or error is None or (self._offer is not None and self._offer.source == "board"):
             return
@@ -173,7 +187,16 @@ class CameraCalibration:
     def _use(self, mount: CameraMount | None) -> None:
         self._mount, self._offer = mount, None
         self._model.mount_camera(mount)
+        self.timing = None
         self._monitor.forget()
+
+    def _timing(self) -> FrameTiming | None:
+        """The delay in use, corrected by what the monitor has found; None where nothing is to be corrected."""
+        time = self._monitor.time
+        if time is None or time.warning is None:
+            return None
+        delay = float(np.clip((self._delay or 0.0) + time.offset, -LARGEST_DELAY, LARGEST_DELAY))
+        return FrameTiming(delay=delay, made_at=self._clock(), views=time.pictures, delay_sd=time.sd)
 
     def _corrected(self, error: MountError) -> CameraMount:
         """The calibration in use, corrected by what the monitor has found."""

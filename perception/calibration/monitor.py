@@ -241,7 +241,7 @@ class MountMonitor:
         if not np.isfinite(velocity).all():
             return
         if self._last is not None and stamp < self._last.stamp:
-            self._forget_time()
+            self.forget_time()
         self._number += 1
         picture = _picture(self._number, R, t, velocity, base, stamp, axes)
         if picture is None:
@@ -264,7 +264,7 @@ class MountMonitor:
             self._count += 1
             self._estimate()
 
-    def _forget_time(self) -> None:
+    def forget_time(self) -> None:
         """Forget what tells the offset of time, as the clock is another one."""
         self._pictures, self._last, self.time, self._theta = [], None, None, np.append(self._theta[_MOUNT], 0.0)
         self._standing = deque(pair for pair in self._standing if not pair.moving)

@@ -1,4 +1,4 @@
-"""The files that keep the calibrations, in the robot's state folder: `camera.toml`, `base.toml` and `arm.toml`."""
+"""The files that keep the calibrations, in the robot's state folder: of the camera, base, arm and camera clock."""
 
 import tomllib
 from dataclasses import dataclass
@@ -10,12 +10,12 @@ import numpy as np
 
 from rolling_panda.errors import ConfigError
 from rolling_panda.messages.perception import CameraMount
-from rolling_panda.messages.robot import AnyCalibration, ArmCalibration, BaseCalibration
+from rolling_panda.messages.robot import AnyCalibration, ArmCalibration, BaseCalibration, FrameTiming
 from rolling_panda.model.differential_drive import WheelSizes
 from rolling_panda.model.robot import RobotModel, mount_pose, turn_and_shift
 from rolling_panda.runtime.state_folder import replace_durably
 
-FILE, BASE_FILE, ARM_FILE = "camera.toml", "base.toml", "arm.toml"
+FILE, BASE_FILE, ARM_FILE, TIMING_FILE = "camera.toml", "base.toml", "arm.toml", "timing.toml"
 #: A calibration that places the camera farther from the drawing than this (rad, m) is of another camera or bracket.
 FARTHEST_TURN, FARTHEST_SHIFT = 0.15, 0.05
 #: A calibration is old from this age on (s): work shakes brackets loose.
@@ -25,9 +25,18 @@ FARTHEST_WHEELS, FARTHEST_APART = 0.05, 0.02
 _HEAD = "# Where the camera is on the arm's flange. Without this file, perception takes it to be where it is drawn."
 _BASE_HEAD = "# Sizes of the base's wheels (m). Without this file, the bridge takes them to be as drawn."
 _ARM_HEAD = "# Offsets of the arm's encoders (rad). Without this file, the bridge takes them to be zero."
+_TIMING_HEAD = "# Delay of the camera's pictures (s). Without this file, the bridge takes it to be as configured."
 _REMEDY = "calibrate the camera again, or remove the file"
 _BASE_REMEDY = "calibrate the base again, or remove the file"
 _ARM_REMEDY = "calibrate the arm again, or remove the file"
+_TIMING_REMEDY = "remove the file, and use the next calibration that is offered"
+
+#: File of each calibration of the robot, and its first line.
+_KEPT_IN = {
+    BaseCalibration: (BASE_FILE, _BASE_HEAD),
+    ArmCalibration: (ARM_FILE, _ARM_HEAD),
+    FrameTiming: (TIMING_FILE, _TIMING_HEAD),
+}
 
 Kept = TypeVar("Kept")
 
@@ -38,6 +47,7 @@ class Calibrated:
 
     base: BaseCalibration | None = None
     arm: ArmCalibration | None = None
+    timing: FrameTiming | None = None
 
 
 def load(folder: Path, robot_id: str, drawn: RobotModel) -> CameraMount | None:
@@ -74,7 +84,7 @@ def save(folder: Path, robot_id: str, mount: CameraMount) -> None:
 
 
 def load_robot(folder: Path, robot_id: str, drawn: WheelSizes) -> Calibrated:
-    """The calibrations of a robot's wheels and joints.
+    """The calibrations of a robot's wheels, joints and camera clock.
 
     Args:
         folder: State folder of the robot.
@@ -91,7 +101,9 @@ def load_robot(folder: Path, robot_id: str, drawn: WheelSizes) -> Calibrated:
             f"{path} has wheels that differ from those drawn by more than {100 * FARTHEST_WHEELS:.0f} %, or from each "
             f"other by more than {100 * FARTHEST_APART:.0f} %; {_BASE_REMEDY}"
         )
-    return Calibrated(base, _read(folder / ARM_FILE, robot_id, ArmCalibration, "an arm", _ARM_REMEDY))
+    arm = _read(folder / ARM_FILE, robot_id, ArmCalibration, "an arm", _ARM_REMEDY)
+    timing = _read(folder / TIMING_FILE, robot_id, FrameTiming, "a camera's clock", _TIMING_REMEDY)
+    return Calibrated(base, arm, timing)
 
 
 def save_robot(folder: Path, robot_id: str, calibration: AnyCalibration) -> None:
@@ -100,8 +112,7 @@ def save_robot(folder: Path, robot_id: str, calibration: AnyCalibration) -> None
     Raises:
         OSError: The file is not on disk.
     """
-    arm = isinstance(calibration, ArmCalibration)
-    path, head = (ARM_FILE, _ARM_HEAD) if arm else (BASE_FILE, _BASE_HEAD)
+    path, head = _KEPT_IN[type(calibration)]
     _write(folder / path, robot_id, calibration, head)
 
 

@@ -6,7 +6,7 @@ from typing import Annotated, Final, Literal
 import msgspec
 from msgspec import Meta, Struct
 
-from rolling_panda.messages.robot import NO_OFFSETS, ArmCalibration, BaseCalibration, JointOffsets
+from rolling_panda.messages.robot import NO_OFFSETS, ArmCalibration, BaseCalibration, FrameTiming, JointOffsets
 from rolling_panda.messages.types import (
     Count,
     Covariance,
@@ -413,16 +413,17 @@ class CameraState(Message, frozen=True, kw_only=True):
 
 
 class RobotCalibration(Message, frozen=True, kw_only=True):
-    """Perception → controller and server: what pictures of the board tell of the robot itself.
+    """Perception → controller and server: what pictures tell of the robot itself.
 
     Attributes:
-        header: Stamp of the newest picture.
+        header: Stamp of the newest picture of the board; 0 before the first.
         base_views: Pictures of the board since the last calibration of the base began.
         base: A new calibration of the base, which `UseBase` takes; None without one.
         base_refused: Why the last calibration of the base gave none; None if it gave one, or before the first.
         arm_views: Pictures of the board since the last calibration of the arm began.
         arm: A new calibration of the arm, which `UseArm` takes; None without one.
         arm_refused: Why the last calibration of the arm gave none; None if it gave one, or before the first.
+        timing: A new calibration of the camera's clock, by ordinary work, which `UseTiming` takes; None without one.
     """
 
     header: Header
@@ -432,6 +433,7 @@ class RobotCalibration(Message, frozen=True, kw_only=True):
     arm_views: Count = 0
     arm: ArmCalibration | None = None
     arm_refused: Reason | None = None
+    timing: FrameTiming | None = None
 
 
 class Scenery(Message, frozen=True, kw_only=True):

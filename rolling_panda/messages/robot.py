@@ -218,8 +218,29 @@ class ArmCalibration(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     offset_sd: NonNegative = 0.0
 
 
+#: The most by which pictures may be exposed later than their times tell, or earlier (s).
+LARGEST_DELAY: Final = 0.2
+Delay = Annotated[float, Meta(ge=-LARGEST_DELAY, le=LARGEST_DELAY)]
+
+
+class FrameTiming(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Calibration of the camera's clock.
+
+    Attributes:
+        delay: By how much pictures are exposed later than their times tell (s).
+        made_at: Time of the calibration.
+        views: Number of pictures in motion that it is from.
+        delay_sd: Standard deviation of the delay (s).
+    """
+
+    delay: Delay
+    made_at: WallTime = 0.0
+    views: Count = 0
+    delay_sd: NonNegative = 0.0
+
+
 #: A calibration of the robot itself, which the bridge uses.
-AnyCalibration = BaseCalibration | ArmCalibration
+AnyCalibration = BaseCalibration | ArmCalibration | FrameTiming
 
 
 class UseCalibration(Message, frozen=True, kw_only=True):
@@ -227,13 +248,15 @@ class UseCalibration(Message, frozen=True, kw_only=True):
 
     Attributes:
         user: Who wants it.
-        base: Of the base; None if it is of the arm.
-        arm: Of the arm; None if it is of the base.
+        base: Of the base; None if it is of something else.
+        arm: Of the arm; None if it is of something else.
+        timing: Of the camera's clock; None if it is of something else.
     """
 
     user: Text
     base: BaseCalibration | None = None
     arm: ArmCalibration | None = None
+    timing: FrameTiming | None = None
 
 
 class BridgeState(Message, frozen=True, kw_only=True):
@@ -262,6 +285,7 @@ class BridgeState(Message, frozen=True, kw_only=True):
         relaxed_limits: Safety limits that its configuration sets less strictly than usual, within their hard bounds.
         base: Calibration of the wheels in use; None while they are taken to be as drawn.
         arm: Calibration of the joints' zeros in use; None while they are taken to be as drawn.
+        timing: Calibration of the camera's clock in use; None while its delay is as configured.
     """
 
     header: Header
@@ -285,6 +309,7 @@ class BridgeState(Message, frozen=True, kw_only=True):
     moving: bool = False
     base: BaseCalibration | None = None
     arm: ArmCalibration | None = None
+    timing: FrameTiming | None = None
 
 
 class ReleaseStop(Message, frozen=True, kw_only=True):
@@ -341,6 +366,7 @@ class CameraFrame(Message, frozen=True, kw_only=True):
         joint_offsets: Offsets of the arm's joints that were taken from what its encoders told (rad).
         velocity: Measured actuated velocities at exposure (rad/s); None in recordings of earlier versions.
         attitude: How the base stood on the ground at exposure; None without inertial sensors.
+        delay: By how much the bridge took the picture to be exposed later than its time tells (s).
     """
 
     header: Header
@@ -358,3 +384,4 @@ class CameraFrame(Message, frozen=True, kw_only=True):
     joint_offsets: JointOffsets = NO_OFFSETS
     velocity: ActuatedVelocity | None = None
     attitude: BaseAttitude | None = None
+    delay: Delay = 0.0

@@ -158,6 +158,16 @@ def test_calibrated_joints_are_told_as_drawn_and_end_at_their_own_limits(rig: Ri
     assert rig.plant.breaches() == []
 
 
+def test_pictures_get_the_delay_of_the_camera_clocks_calibration(rig: Rig) -> None:
+    rig.run(0.3, REST)
+    new = m.FrameTiming(delay=-0.04, made_at=5.0)
+    assert rig.core.on_calibration(m.UseCalibration(user="ada", timing=new)).ok
+    assert rig.until(lambda: rig.state.timing == new, REST)
+    frames = [out.frame for out in rig.outputs if out.frame]
+    assert frames[0].delay == 0.0
+    assert rig.until(lambda: next(out.frame for out in reversed(rig.outputs) if out.frame).delay == -0.04, REST)
+
+
 def arm(rig: Rig) -> Array:
     joints = next(out.joints for out in reversed(rig.outputs) if out.joints)
     return np.array(joints.position[2:])

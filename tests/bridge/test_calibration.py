@@ -19,7 +19,7 @@ from bridge.sim.world.errors import draw_errors
 from rolling_panda import messages as m
 from rolling_panda.calibration.file import Calibrated
 from rolling_panda.config import load_section
-from rolling_panda.messages.robot import NO_OFFSETS, ArmCalibration, BaseCalibration, UseCalibration
+from rolling_panda.messages.robot import NO_OFFSETS, ArmCalibration, BaseCalibration, FrameTiming, UseCalibration
 from rolling_panda.resources import resource
 from tests.support.bridge_rig import MODEL, REST, NoCamera, Parts, Rig, SimulatedPlant
 
@@ -120,6 +120,17 @@ def test_base_and_arm_are_calibrated_one_after_the_other_and_each_stays():
     assert (calibration.base, calibration.arm, calibration.joint_offsets) == (WORN, ARM, ARM.offsets)
     shown = calibration.measured(measurement((50.0, 70.0)))
     assert shown.position[2:] == pytest.approx(0.1 - np.array(ARM.offsets))
+
+
+def test_the_cameras_delay_is_used_once_it_is_kept_and_leaves_wheels_and_joints_as_they_were():
+    disk: Future[None] = Future()
+    calibration = Calibration(DRAWN, FASTEST, Calibrated(WORN, ARM), keep=lambda each: disk)
+    timing = FrameTiming(delay=0.038, made_at=5.0)
+    assert calibration.request(timing) is None and calibration.timing is None
+    disk.set_result(None)
+    told = calibration.kept(at_rest=True)
+    assert told.code == "timing_calibration_used" and dict(told.values)["delay"] == pytest.approx(38.0)
+    assert (calibration.base, calibration.arm, calibration.timing) == (WORN, ARM, timing)
 
 
 def true_wheels(errors):

@@ -87,13 +87,13 @@ def test_a_picture_that_does_not_know_when_it_was_taken_gets_the_posture_of_its_
 
 
 def test_pictures_that_are_later_than_their_times_get_the_posture_of_that_much_later() -> None:
-    for offset, taken_at, stamp in ((0.04, 1.5, 1.54), (-0.03, 1.5, 1.47), (0.04, None, 1.04), (0.5, 2.9, 2.99)):
-        shutter = CameraTrigger(2.0, 0.5, 1e-3, offset)
+    for delay, taken_at, stamp in ((0.04, 1.5, 1.54), (-0.03, 1.5, 1.47), (0.04, None, 1.04), (0.5, 2.9, 2.99)):
+        shutter = CameraTrigger(2.0, 0.5, 1e-3)
         for k in range(300):
             shutter.follow(posture(k * 0.01, k * 0.003))
         shutter.exposed(1000, posture(1.0, 0.3))
-        frame = shutter.frame(replace(PICTURE, taken_at=taken_at))
-        assert frame is not None
+        frame = shutter.frame(replace(PICTURE, taken_at=taken_at), delay)
+        assert frame is not None and frame.delay == delay
         assert (frame.header.stamp, frame.base.x) == (pytest.approx(stamp), pytest.approx(0.3 * stamp))
 
 

@@ -33,6 +33,7 @@ COMMANDS = tuple(kind for kind in INTENTS if COMMAND_OF[kind].tag != "control")
 
 WHEELS = m.BaseCalibration(left=0.133, right=0.133, track=0.51, made_at=5.0)
 JOINTS = m.ArmCalibration(offsets=m.NO_OFFSETS, made_at=5.0)
+CLOCK = m.FrameTiming(delay=0.04, made_at=5.0)
 
 
 class World:
@@ -132,8 +133,8 @@ class World:
                 return [kind(**common, posture=name) for name in free[:1]]
             case intents.DeletePosture:
                 return [kind(**common, posture=each.name) for each in state.postures if each.user]
-            case intents.UseBase | intents.UseArm:
-                self.robot.hear(RobotCalibration(header=m.Header(), base=WHEELS, arm=JOINTS))
+            case intents.UseBase | intents.UseArm | intents.UseTiming:
+                self.robot.hear(RobotCalibration(header=m.Header(), base=WHEELS, arm=JOINTS, timing=CLOCK))
                 return [example(kind)]
             case _:
                 return [example(kind)]

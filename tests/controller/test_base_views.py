@@ -11,7 +11,7 @@ from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.messages.perception import BASE, Capsule, CloseUpRequest, RobotCalibration
-from rolling_panda.messages.robot import NO_OFFSETS, ArmCalibration, BaseCalibration, UseCalibration
+from rolling_panda.messages.robot import NO_OFFSETS, ArmCalibration, BaseCalibration, FrameTiming, UseCalibration
 from rolling_panda.model.robot import ARM_Q
 from tests.support.controller_at_work import CONFIG, finish, robot, run_until
 
@@ -117,6 +117,13 @@ def test_the_calibration_that_was_seen_goes_to_the_bridge_once_and_no_other():
     assert r.ask(intents.UseArm(user="ada", made_at=7.0)).reason.code == "no_arm_offered"
     assert r.ask(intents.UseArm(user="ada", made_at=8.0)).ok
     assert sent(r) == [UseCalibration(user="ada", arm=arm)]
+    assert r.ask(intents.UseTiming(user="ada", made_at=9.0)).reason.code == "no_timing_offered"
+    timing = FrameTiming(delay=0.04, made_at=9.0)
+    r.hear(RobotCalibration(header=m.Header(), base=OFFER, arm=arm, timing=timing))
+    r.step()
+    assert r.ask(intents.UseTiming(user="ada", made_at=8.0)).reason.code == "no_timing_offered"
+    assert r.ask(intents.UseTiming(user="ada", made_at=9.0)).ok
+    assert sent(r) == [UseCalibration(user="ada", timing=timing)]
     r.ask(intents.Arm(user="ada"))
     r.ask(intents.CalibrateBase(user="ada"))
     r.run(0.5)

@@ -84,7 +84,7 @@ class FakePerception:
         self.release, self.noted, self.newest, self.processed = threading.Event(), [], None, 0
         self.camera = SimpleNamespace(state=CameraState(header=m.Header()))
         self.localisation = RowFrame(True).message(0.0)
-        self.calibrator = SimpleNamespace(state=RobotCalibration(header=m.Header()))
+        self.robot_calibration = RobotCalibration(header=m.Header())
         self.camera_rays = SimpleNamespace(add=lambda frame: self.noted.append(frame.header.frame_id))
 
     def answer(self, request):
@@ -194,7 +194,7 @@ def test_what_pictures_of_the_board_tell_is_sent_when_it_changes(parts):
     loop.step(0.0)
     loop.step(0.1)
     assert [state.base_views for state in told] == [0]
-    perception.calibrator.state = RobotCalibration(header=m.Header(1.0), base_views=4)
+    perception.robot_calibration = RobotCalibration(header=m.Header(1.0), base_views=4)
     loop.see("frame", 1.0)
     step_until(loop, lambda: told[-1].base_views == 4, 1.0)
 

@@ -6,10 +6,20 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rolling_panda.calibration.file import ARM_FILE, BASE_FILE, FILE, Calibrated, load, load_robot, save, save_robot
+from rolling_panda.calibration.file import (
+    ARM_FILE,
+    BASE_FILE,
+    FILE,
+    TIMING_FILE,
+    Calibrated,
+    load,
+    load_robot,
+    save,
+    save_robot,
+)
 from rolling_panda.errors import ConfigError
 from rolling_panda.messages.perception import CameraMount
-from rolling_panda.messages.robot import ArmCalibration, BaseCalibration, Intrinsics
+from rolling_panda.messages.robot import ArmCalibration, BaseCalibration, FrameTiming, Intrinsics
 from rolling_panda.model.robot import RobotModel, mount_pose, pose_message
 
 MODEL = RobotModel()
@@ -28,12 +38,12 @@ def test_what_was_saved_is_read_at_the_next_start(tmp_path):
     assert load(tmp_path, "rp1", MODEL) == mount()
 
 
-def check_refused(path, spoil, says, part, loaded):
+def check_refused(path, spoil, says, remedy, loaded):
     """A spoiled file is refused with what is wrong and what to do."""
     path.write_text(spoil(path.read_text()))
     with pytest.raises(ConfigError) as refused:
         loaded()
-    assert says in str(refused.value) and f"calibrate the {part} again" in str(refused.value), refused.value
+    assert says in str(refused.value) and remedy in str(refused.value), refused.value
 
 
 @pytest.mark.parametrize(
@@ -50,7 +60,7 @@ def check_refused(path, spoil, says, part, loaded):
 )
 def test_a_file_of_another_robot_or_with_other_values_is_refused_with_what_to_do(tmp_path, spoil, says):
     save(tmp_path, "rp1", mount())
-    check_refused(tmp_path / FILE, spoil, says, "camera", lambda: load(tmp_path, "rp1", MODEL))
+    check_refused(tmp_path / FILE, spoil, says, "calibrate the camera again", lambda: load(tmp_path, "rp1", MODEL))
 
 
 @pytest.mark.parametrize("far", [{"turn": (0.0, 0.2, 0.0)}, {"shift": (0.06, 0.0, 0.0)}])
@@ -99,7 +109,9 @@ def test_measured_wheels_are_read_at_the_next_start(tmp_path):
 )
 def test_a_file_of_other_wheels_is_refused_with_what_to_do(tmp_path, spoil, says):
     save_robot(tmp_path, "rp1", base())
-    check_refused(tmp_path / BASE_FILE, spoil, says, "base", lambda: load_robot(tmp_path, "rp1", DRAWN))
+    check_refused(
+        tmp_path / BASE_FILE, spoil, says, "calibrate the base again", lambda: load_robot(tmp_path, "rp1", DRAWN)
+    )
 
 
 def test_wheels_far_from_those_drawn_or_from_each_other_are_refused(tmp_path):
@@ -121,6 +133,22 @@ def test_the_joints_zeros_are_read_at_the_next_start_beside_the_wheels(tmp_path)
     assert load_robot(tmp_path, "rp1", DRAWN) == Calibrated(base(), ARM)
 
 
+def test_the_camera_clocks_delay_is_read_at_the_next_start_and_one_that_cannot_be_is_refused(tmp_path):
+    timing = FrameTiming(delay=0.038, made_at=1.8e9, views=14, delay_sd=0.002)
+    save_robot(tmp_path, "rp1", ARM)
+    save_robot(tmp_path, "rp1", timing)
+    assert load_robot(tmp_path, "rp1", DRAWN) == Calibrated(arm=ARM, timing=timing)
+    for old, new, says in (('"rp1"', '"rp2"', "'rp2'"), ("0.038", "0.38", "delay"), ("views", "wiews", "wiews")):
+        save_robot(tmp_path, "rp1", timing)
+        check_refused(
+            tmp_path / TIMING_FILE,
+            lambda text, old=old, new=new: text.replace(old, new),
+            says,
+            "use the next calibration that is offered",
+            lambda: load_robot(tmp_path, "rp1", DRAWN),
+        )
+
+
 @pytest.mark.parametrize(
     ("spoil", "says"),
     [
@@ -134,4 +162,6 @@ def test_the_joints_zeros_are_read_at_the_next_start_beside_the_wheels(tmp_path)
 )
 def test_a_file_of_another_arm_is_refused_with_what_to_do(tmp_path, spoil, says):
     save_robot(tmp_path, "rp1", ARM)
-    check_refused(tmp_path / ARM_FILE, spoil, says, "arm", lambda: load_robot(tmp_path, "rp1", DRAWN))
+    check_refused(
+        tmp_path / ARM_FILE, spoil, says, "calibrate the arm again", lambda: load_robot(tmp_path, "rp1", DRAWN)
+    )

@@ -93,6 +93,7 @@ def client(server):
         ("base/use", {"made_at": 5.0}, intents.UseBase(user="ann", made_at=5.0)),
         ("arm/calibrate", None, intents.CalibrateArm(user="ann")),
         ("arm/use", {"made_at": 5.0}, intents.UseArm(user="ann", made_at=5.0)),
+        ("timing/use", {"made_at": 5.0}, intents.UseTiming(user="ann", made_at=5.0)),
         ("acknowledge", None, intents.Acknowledge(user="ann")),
         ("reset", {"reason": "checked"}, intents.Reset(user="ann", reason="checked")),
         ("control/take", {"confirm": True}, intents.TakeControl(user="ann", confirm=True)),

@@ -43,7 +43,7 @@ STILL = (
 )
 COMMAND_NAMES = tuple(command.name for command in COMMANDS if command.process == "controller" or command.modes)
 ALLOWED = {
-    "IDLE": ("Arm", "UseCamera", "UseBase", "UseArm"),
+    "IDLE": ("Arm", "UseCamera", "UseBase", "UseArm", "UseTiming"),
     "READY": (
         "Start",
         "Continue",
@@ -56,10 +56,11 @@ ALLOWED = {
         "CalibrateBase",
         "UseArm",
         "CalibrateArm",
+        "UseTiming",
     ),
     "AUTO": ("Pause",),
     "TELEOP": ("Pause", "Teleoperation"),
-    "PAUSED": ("Resume", "Continue", "UseCamera", "UseBase", "UseArm"),
+    "PAUSED": ("Resume", "Continue", "UseCamera", "UseBase", "UseArm", "UseTiming"),
     "ESTOP_LATCHED": ("Reset",),
 }
 

@@ -10,7 +10,7 @@ from playwright.sync_api import Locator, Page, expect
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.messages.perception import CameraMount, CameraState, RobotCalibration
-from rolling_panda.messages.robot import ArmCalibration, BaseCalibration
+from rolling_panda.messages.robot import ArmCalibration, BaseCalibration, FrameTiming
 from tests.support.page_parts import open_screen, show_mode
 from tests.support.played_page import box_of, until
 from tests.support.played_server import PlayedServer, bridge, controller, diagnostics
@@ -159,6 +159,26 @@ def test_the_cameras_calibration_is_told_checked_and_taken_from_its_panel(page: 
     use.click()
     until(page, lambda: server.posted[-1] == ("/api/camera/use", {"made_at": 5.0}))
     show_mode(page, server, controller("AUTO"))
+    expect(use).to_have_attribute("aria-disabled", "true")
+
+
+def test_the_camera_clocks_calibration_is_told_and_taken_from_the_panel(page: Page, server: PlayedServer) -> None:
+    panel = page.locator("rp-calibration")
+    use, rows = panel.locator("#use-timing"), panel.locator("[data-calibration^=timing]")
+    show_mode(page, server, controller("IDLE"))
+    open_screen(page, "engineer")
+    expect(rows).to_have_text(["none: pictures are taken to be as late as configured", "none"])
+    expect(use).to_have_attribute("aria-disabled", "true")
+    expect(panel.locator("#calibrate-timing")).to_have_count(0)
+    made = FrameTiming(delay=0.0384, made_at=5.0, views=14, delay_sd=0.0021)
+    server.calibration = RobotCalibration(header=m.Header(), timing=made)
+    measured = "from 14 pictures in motion: 38 ms late (±\u00a02 ms)"
+    expect(rows.last).to_contain_text(measured, timeout=6000)
+    use.click()
+    until(page, lambda: server.posted[-1] == ("/api/timing/use", {"made_at": 5.0}))
+    server.bridge = bridge(timing=made)
+    expect(rows.first).to_contain_text(measured)
+    expect(rows.last).to_have_text("none")
     expect(use).to_have_attribute("aria-disabled", "true")
 
 

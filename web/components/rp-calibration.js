@@ -1,4 +1,4 @@
-// Calibration of camera, base and arm: what is in use, how well ordinary work agrees with it, and a new one where there is one.
+// Calibration of camera, base, arm and camera clock: what is in use, how well ordinary work agrees with it, and a new one where there is one.
 
 import { whyNot } from "../js/control/allowed.js";
 import { take } from "../js/control/commands.js";
@@ -15,17 +15,20 @@ import { element, setEnabled, setText } from "../js/views/dom.js";
 /** @typedef {import("../js/link/messages.js").BaseCalibration} BaseCalibration */
 /** @typedef {import("../js/link/messages.js").CameraMount} CameraMount */
 /** @typedef {import("../js/link/messages.js").CameraState} CameraState */
+/** @typedef {import("../js/link/messages.js").FrameTiming} FrameTiming */
 /** @typedef {import("../js/link/messages.js").RobotCalibration} RobotCalibration */
-/** @typedef {"CheckCamera"|"CalibrateCamera"|"UseCamera"|"CalibrateBase"|"UseBase"|"CalibrateArm"|"UseArm"} Command */
+/** @typedef {"CheckCamera"|"CalibrateCamera"|"UseCamera"|"CalibrateBase"|"UseBase"|"CalibrateArm"|"UseArm"|"UseTiming"} Command */
 
 /** Period of the calibrations' state while the screen is open (ms). */
 const AGAIN_MS = 2000;
 const DEGREE = Math.PI / 180;
-const ROWS = /** @type {const} */ (["used", "seen", "offer", "base", "base_offer", "arm", "arm_offer"]);
+const ROWS = /** @type {const} */ (["used", "seen", "offer", "base", "base_offer", "arm", "arm_offer", "timing", "timing_offer"]);
 /** Parts of the robot that the bridge uses a calibration of. */
 const PARTS = /** @type {const} */ ([
   { part: "base", calibrate: "CalibrateBase", use: "UseBase", none: () => reason("no_base_offered") },
   { part: "arm", calibrate: "CalibrateArm", use: "UseArm", none: () => reason("no_arm_offered") },
+  // Ordinary work tells it.
+  { part: "timing", calibrate: null, use: "UseTiming", none: () => reason("no_timing_offered") },
 ]);
 
 class RpCalibration extends HTMLElement {
@@ -43,16 +46,16 @@ class RpCalibration extends HTMLElement {
     const use = button("use-camera", "UseCamera", () => void take("calibration"));
     const parts = PARTS.map(({ part, calibrate, use, none }) => {
       const path = (/** @type {string} */ what) => `api/${part}/${what}`;
-      const measure = button(`calibrate-${part}`, calibrate, () => void ask(text(`command.${calibrate}`), path("calibrate")));
+      const measure = calibrate && button(`calibrate-${part}`, calibrate, () => void ask(text(`command.${calibrate}`), path("calibrate")));
       const useIt = button(`use-${part}`, use, () => {
         const offer = this.robot.get()?.[part];
         if (offer) void ask(text(`command.${use}`), path("use"), { made_at: offer.made_at });
       });
       const draw = () => {
-        setEnabled(measure, whyNot(calibrate), text(`calibration.${part}_hint`));
+        if (measure) setEnabled(measure, whyNot(calibrate), text(`calibration.${part}_hint`));
         setEnabled(useIt, whyNot(use) ?? (newPart(part, this.robot.get()) ? null : none()), text(`calibration.${part}_use_hint`));
       };
-      return { buttons: [measure, useIt], draw };
+      return { buttons: measure ? [measure, useIt] : [useIt], draw };
     });
     this.append(list, element("div", { class: "buttons" }, check, calibrate, use, ...parts.flatMap(({ buttons }) => buttons)));
     whileOpen("engineer", AGAIN_MS, async () => {
@@ -62,7 +65,7 @@ class RpCalibration extends HTMLElement {
     drawOn([this.camera, this.robot, pageState, link, now], () => {
       if (screen.get() !== "engineer") return;
       const [camera, robot] = [this.camera.get(), this.robot.get()];
-      const words = { ...cameraWords(camera), ...partWords("base", robot), ...partWords("arm", robot) };
+      const words = { ...cameraWords(camera), ...partWords("base", robot), ...partWords("arm", robot), ...partWords("timing", robot) };
       for (const { row, cell } of cells) setText(cell, words[row]);
       setEnabled(check, whyNot("CheckCamera"), text("calibration.check_hint"));
       setEnabled(calibrate, whyNot("CalibrateCamera"), text("calibration.calibrate_hint"));
@@ -102,22 +105,25 @@ function madeWords({ source, made_at, views, pixels, angle_sd, shift_sd }) {
   return counted("calibration.work", views, { date, sd, shift });
 }
 
-/** The new calibration of a part; null without one, and for the one in use. @param {"base"|"arm"} part @param {RobotCalibration|null} robot */
+/** @typedef {"base"|"arm"|"timing"} Part */
+
+/** The new calibration of a part; null without one, and for the one in use. @param {Part} part @param {RobotCalibration|null} robot */
 function newPart(part, robot) {
   const offer = robot?.[part];
   return offer && offer.made_at !== pageState.get()?.bridge?.[part]?.made_at ? offer : null;
 }
 
-/** What is in use for a part, and what is new. @template {"base"|"arm"} Part @param {Part} part @param {RobotCalibration|null} robot */
+/** What is in use for a part, and what is new. @template {Part} P @param {P} part @param {RobotCalibration|null} robot */
 function partWords(part, robot) {
   const used = pageState.get()?.bridge?.[part];
-  const [offer, refused] = [newPart(part, robot), robot?.[`${part}_refused`]];
-  const found = offer ? measuredWords(offer) : refused && robot?.[`${part}_views`] ? reasonText(refused) : text("calibration.none");
+  const offer = newPart(part, robot);
+  const refused = part !== "timing" && robot?.[`${part}_views`] ? robot[`${part}_refused`] : null;
+  const found = offer ? measuredWords(offer) : refused ? reasonText(refused) : text("calibration.none");
   const words = { [part]: used ? measuredWords(used) : text(`calibration.${part}_drawn`), [`${part}_offer`]: robot ? found : text("calibration.untold") };
-  return /** @type {Record<Part|`${Part}_offer`, string>} */ (words);
+  return /** @type {Record<P|`${P}_offer`, string>} */ (words);
 }
 
-/** @param {BaseCalibration|ArmCalibration} made */
+/** @param {BaseCalibration|ArmCalibration|FrameTiming} made */
 function measuredWords(made) {
   const date = dateWords(made.made_at);
   if ("offsets" in made) {
@@ -125,6 +131,10 @@ function measuredWords(made) {
     return counted("calibration.arm_measured", made.views, { date, offsets, sd: turn(made.offset_sd), pixels: decimal(made.pixels, 2) });
   }
   const mm = (/** @type {number} */ length) => decimal(length * 1000, 2);
+  if ("delay" in made) {
+    const [delay, sd] = [decimal(made.delay * 1000, 0), decimal(made.delay_sd * 1000, 0)];
+    return counted("calibration.timing_measured", made.views, { date, delay, sd });
+  }
   const percent = (/** @type {number} */ share) => decimal(share * 100, 2);
   return counted("calibration.base_measured", made.views, {
     date,

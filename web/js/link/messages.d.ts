@@ -312,6 +312,18 @@ export interface ArmCalibration {
   offset_sd: number;
 }
 
+/** Calibration of the camera's clock. */
+export interface FrameTiming {
+  /** By how much pictures are exposed later than their times tell (s). */
+  delay: number;
+  /** Time of the calibration. */
+  made_at: number;
+  /** Number of pictures in motion that it is from. */
+  views: number;
+  /** Standard deviation of the delay (s). */
+  delay_sd: number;
+}
+
 /** Bridge → all: stop latch, watchdog and cutter of the bridge. The controller can override none of them. */
 export interface BridgeState {
   type: "BridgeState";
@@ -357,6 +369,8 @@ export interface BridgeState {
   base: BaseCalibration|null;
   /** Calibration of the joints' zeros in use; None while they are taken to be as drawn. */
   arm: ArmCalibration|null;
+  /** Calibration of the camera's clock in use; None while its delay is as configured. */
+  timing: FrameTiming|null;
 }
 
 /** Bridge → all: measured actuated coordinates, like sensor_msgs/JointState. */
@@ -953,10 +967,10 @@ export interface CameraState {
   warning: Reason|null;
 }
 
-/** Perception → controller and server: what pictures of the board tell of the robot itself. */
+/** Perception → controller and server: what pictures tell of the robot itself. */
 export interface RobotCalibration {
   type: "RobotCalibration";
-  /** Stamp of the newest picture. */
+  /** Stamp of the newest picture of the board; 0 before the first. */
   header: Header;
   /** Pictures of the board since the last calibration of the base began. */
   base_views: number;
@@ -970,6 +984,8 @@ export interface RobotCalibration {
   arm: ArmCalibration|null;
   /** Why the last calibration of the arm gave none; None if it gave one, or before the first. */
   arm_refused: Reason|null;
+  /** A new calibration of the camera's clock, by ordinary work, which `UseTiming` takes; None without one. */
+  timing: FrameTiming|null;
 }
 
 /** A cut as it is drawn on a picture. */
