@@ -81,6 +81,7 @@ _SAME_CUT = 0.02
 _REJECTED: dict[Rejection, Callable[[float, str], m.Reason]] = {
     "off the row": reasons.wood_off_row,
     "that another one is": reasons.wood_there_twice,
+    "above the cordon": reasons.wood_above_cordon,
     "leaning": reasons.wood_leaning,
     "lying": reasons.wood_lying,
     "too thick": reasons.wood_too_thick,

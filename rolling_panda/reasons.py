@@ -2066,6 +2066,11 @@ def wood_there_twice(count: float, kind: str) -> None:
 
 
 @_reason("info", "")
+def wood_above_cordon(count: float, kind: str) -> None:
+    """Left out of the obstacles: {count:.0f} {kind}, not standing: nothing of it is below the cordon."""
+
+
+@_reason("info", "")
 def wood_leaning(count: float, kind: str) -> None:
     """Left out of the obstacles: {count:.0f} {kind}, leaning."""
 

@@ -19,7 +19,9 @@ from perception.plant.model import SURFACE_OFFSET
 from rolling_panda.messages.types import WoodClass
 
 #: Why wood is implausible.
-Rejection = Literal["off the row", "that another one is", "leaning", "lying", "too thick", "hardly seen"]
+Rejection = Literal[
+    "off the row", "that another one is", "above the cordon", "leaning", "lying", "too thick", "hardly seen"
+]
 
 #: Index of each cell along its line, in cells.
 Levels = NDArray[np.int_]

@@ -6,7 +6,8 @@ wood off the row, is rejected and counted.
 """
 
 import math
-from collections import Counter
+from collections import Counter, deque
+from dataclasses import replace
 
 import numpy as np
 
@@ -27,6 +28,12 @@ _SHAPES: dict[WoodClass, str] = {"post": "upright", "trunk": "upright", "cordon"
 #: A post and a trunk with a smaller distance between their surfaces are the same thing (m).
 _SAME = 0.01
 
+#: A post or trunk reaches at least so far below the cordon beside it, which is at most so far along the row (m).
+_BELOW_CORDON, _BESIDE = 0.12, 0.3
+#: So far below its lowest cell a post would have been seen (m), if any view has it so far from its edge (px). Views of
+#: cameras nearer to each other than this (m) are one; of so many the newest are stored.
+_FOOT, _EDGE, _SAME_VIEW, _VIEWS = 0.08, 10, 0.1, 200
+
 #: Cylinders of a group, and why others were rejected.
 Fit = tuple[list[Cylinder], list[Rejection]]
 
@@ -41,6 +48,8 @@ class ObstacleMap:
             kind: OccupancyGrid(kind, config.cell_size, config.min_hits, config.max_cells) for kind in _SHAPES
         }
         self._fits: dict[WoodClass, list[tuple[Array, Fit]]] = {}
+        self._views: deque[View] = deque(maxlen=_VIEWS)
+        """Newest viewpoints, without their images."""
         self.rejected: Counter[tuple[WoodClass, Rejection]] = Counter()
         """Implausible wood by class and reason, as of the last frame."""
 
@@ -56,6 +65,7 @@ class ObstacleMap:
             Capsules in odom (m), the nearest where they are too many.
         """
         config = self._config
+        self._add_view(view)
         for kind, grid in self._grids.items():
             min_depth = config.min_depth if kind == "wire" else config.min_depth_thick
             grid.update(view, labels, min_depth, config.max_depth, config.max_points, only_add)
@@ -63,7 +73,7 @@ class ObstacleMap:
         plane = row_plane(occupied)
         self.rejected.clear()
         capsules = [capsule for kind, cells in occupied.items() for capsule in self._capsules(kind, cells, plane)]
-        capsules = self._without_duplicates(capsules)
+        capsules = self._without_duplicates(self._standing(capsules, occupied["cordon"].position))
         most = max(1, int(_MAX_SHARE * config.max_capsules))
         if len(capsules) <= most:
             return tuple(capsules)
@@ -83,6 +93,32 @@ class ObstacleMap:
             for cylinders, _ in fits
             for each in cylinders
         ]
+
+    def _add_view(self, view: View) -> None:
+        if all(math.dist(view.t, known.t) > _SAME_VIEW for known in self._views):
+            self._views.append(replace(view, depth=view.depth[:0], labels=None, color_jpeg=b""))
+
+    def _standing(self, capsules: list[Capsule], cordon: Array) -> list[Capsule]:
+        """Without posts and trunks that have no foot where one would be seen: canes look like them along the row."""
+        standing = []
+        for each in capsules:
+            beside = cordon[np.abs(cordon[:, 0] - each.start[0]) < _BESIDE, 2]
+            ends_above = len(beside) > 0 and each.start[2] > np.median(beside) - _BELOW_CORDON
+            if each.kind in ("post", "trunk") and ends_above and self._foot_in_view(each):
+                self.rejected[each.kind, "above the cordon"] += 1
+            else:
+                standing.append(each)
+        return standing
+
+    def _foot_in_view(self, upright: Capsule) -> bool:
+        """Whether any view shows the place right below an upright."""
+        foot = np.array(upright.start) - (0.0, 0.0, _FOOT)
+        for view in self._views:
+            u, v, depth = view.pixels(foot)[0]
+            inside = _EDGE < u < view.intrinsics.width - _EDGE and _EDGE < v < view.intrinsics.height - _EDGE
+            if inside and self._config.min_depth_thick < depth < self._config.max_depth:
+                return True
+        return False
 
     def _without_duplicates(self, capsules: list[Capsule]) -> list[Capsule]:
         """Of a post and a trunk at the same place the longer one stays."""

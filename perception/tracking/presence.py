@@ -5,7 +5,7 @@ from typing import Literal
 import numpy as np
 
 from perception.arrays import Array, Labels
-from perception.segmentation.frame import CANE, NODE, SPUR, View
+from perception.segmentation.frame import CANE, NODE, POST, SPUR, TRUNK, View
 
 #: Largest depth difference of the same wood (m).
 _SAME_DEPTH = 0.025
@@ -13,6 +13,8 @@ _SAME_DEPTH = 0.025
 _MIN_DEPTH = 0.25
 #: Search radius across the view (m), for errors of odometry.
 _SEARCH_RADIUS = 0.008
+#: A post or trunk so near behind a cane looks like it, and the network takes the cane for a part of it (m).
+_ALIKE_BEHIND = 0.15
 #: Wood farther behind the position than this belongs to another row (m).
 _OTHER_ROW = 0.8
 
@@ -41,7 +43,7 @@ def _at(view: View, labels: Labels, u: float, v: float, z: float) -> Presence:
     wood = np.isin(labels[window], (CANE, NODE, SPUR))
     if (wood & (np.abs(depth - z) < _SAME_DEPTH)).any():
         return "present"
-    # Occluded by something nearer, or wood with no depth or with that of another row.
-    if (wood & ((depth == 0.0) | (depth > z + _OTHER_ROW))).any() or ((depth > 0.0) & (depth < z - _SAME_DEPTH)).any():
-        return "not visible"
-    return "gone"
+    nearer = (depth > 0.0) & (depth < z - _SAME_DEPTH)
+    undetermined = wood & ((depth == 0.0) | (depth > z + _OTHER_ROW))
+    alike = np.isin(labels[window], (POST, TRUNK)) & (depth < z + _ALIKE_BEHIND)
+    return "not visible" if (nearer | undetermined | alike).any() else "gone"

@@ -30,6 +30,8 @@ _MAX_MISSES, _MAX_MISSES_UNPUBLISHED = 5, 20
 _SAME_OFFSET = 0.003
 #: Newest observations in the median of the offset.
 _OFFSETS = 7
+#: Observations farther than this from most others are of another cane, or mix the depths of two (m).
+_SAME_PLACE = 0.008
 #: Camera positions nearer to each other than this are one viewpoint (m): what hides a cane hides it from all of them.
 _SAME_VIEWPOINT = 0.05
 #: Standard deviation of one observation, used as prior: depth (2.9 mm at 0.9 m, 0.08 px of a D435i) and half a pixel
@@ -87,6 +89,8 @@ class _Track:
     """Covariance of single observations."""
     offsets: deque[float] = field(default_factory=lambda: deque(maxlen=_OFFSETS))
     """Newest offsets past the last kept node (m)."""
+    observed: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    """Newest observed positions, each at the median offset (N×3, m, map)."""
     viewpoints: list[Array] = field(default_factory=list)
     """Those of the frames that have proposed it (3, m, map)."""
 
@@ -95,6 +99,7 @@ class _Track:
         """From a single observation."""
         cut = proposal.cut
         track = cls(point_id, proposal.number, cut, cut.position, cut.tangent, cut.radius)
+        track.observed = cut.position[None]
         if cut.offset is not None:
             track.offsets.append(cut.offset)
         return track
@@ -120,7 +125,8 @@ class _Track:
         off, turn = position - self.position, cut.tangent - self.tangent
         self.position_scatter = (1.0 - gain) * (self.position_scatter + gain * np.outer(off, off))
         self.tangent_scatter = (1.0 - gain) * (self.tangent_scatter + gain * np.outer(turn, turn))
-        self.position = self.position + gain * off
+        self.observed = np.concatenate([self.observed, position[None]])[-window:]
+        self.position = _agreed(self.observed)
         tangent = self.tangent + gain * turn
         self.tangent = tangent / np.linalg.norm(tangent)
         self.radius += gain * (cut.radius - self.radius)
@@ -130,7 +136,8 @@ class _Track:
         self.offsets.append(cut.offset)
         new = median_high(self.offsets)
         if old is not None:
-            self.position = self.position + (new - old) * self.tangent
+            self.observed = self.observed + (new - old) * self.tangent
+            self.position = _agreed(self.observed)
         if abs(cut.offset - new) < _SAME_OFFSET:
             self.cut = cut
 
@@ -295,6 +302,7 @@ class Tracker:
         for track in self._tracks:
             if track.point_id == point_id and track.published is not None:
                 track.position = position
+                track.observed = np.repeat(position[None], self._config.averaging_window, axis=0)
                 track.hits, track.misses, track.gone = max(track.hits, self._config.averaging_window), 0, 0
                 track.published = self._message(track)
 
@@ -440,6 +448,14 @@ def _add_viewpoint(viewpoints: list[Array], position: Array) -> None:
     """Add a camera position (3, m, map), unless it is one of these viewpoints."""
     if all(distance(position, other) >= _SAME_VIEWPOINT for other in viewpoints):
         viewpoints.append(position)
+
+
+def _agreed(positions: Array) -> Array:
+    """Mean of the positions (N×3) near the one that most others are nearest to."""
+    distances = cdist(positions, positions)
+    middle = distances[np.argmin(np.minimum(distances, 2 * _SAME_PLACE).sum(axis=0))]
+    mean: Array = positions[middle < _SAME_PLACE].mean(axis=0)
+    return mean
 
 
 def position_covariance(scatter: Array, count: int) -> Array:

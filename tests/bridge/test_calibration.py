@@ -131,6 +131,7 @@ def test_the_cameras_delay_is_used_once_it_is_kept_and_leaves_wheels_and_joints_
     told = calibration.kept(at_rest=True)
     assert told.code == "timing_calibration_used" and dict(told.values)["delay"] == pytest.approx(38.0)
     assert (calibration.base, calibration.arm, calibration.timing) == (WORN, ARM, timing)
+    assert Calibration(DRAWN, FASTEST, Calibrated(timing=timing)).timing == timing, "of an earlier start"
 
 
 def true_wheels(errors):

@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -22,7 +23,7 @@ from rolling_panda.model.robot import RobotModel
 
 pytestmark = pytest.mark.long
 
-POST, TRUNK, CORDON = (WOOD_CLASSES.index(kind) for kind in ("post", "trunk", "cordon"))
+BACKGROUND, POST, TRUNK, CORDON = (WOOD_CLASSES.index(kind) for kind in ("background", "post", "trunk", "cordon"))
 
 
 class Standing:
@@ -116,6 +117,24 @@ def test_what_is_taken_for_a_trunk_within_a_post_is_the_post():
         capsules = known.update(standing.frame(), labels)
     at_post = [capsule.kind for capsule in capsules if abs(capsule.start[0] + 0.4) < 0.1 and lean(capsule) < 15.0]
     assert at_post == ["post"]
+
+
+def test_what_ends_above_the_cordon_is_no_post_where_its_foot_would_have_been_seen():
+    standing, known, cut_off = Standing(0, -0.5), ObstacleMap(ObstacleConfig()), ObstacleMap(ObstacleConfig())
+    post = standing.labels == POST
+    row = int(np.median(np.nonzero(standing.labels == CORDON)[0])) + 20
+    below = np.arange(len(post))[:, None] > row
+    for _ in range(10):
+        view, labels = standing.frame(), standing.labels.copy()
+        labels[post & below], view.depth[post & below] = BACKGROUND, 3.0
+        capsules = known.update(view, labels)
+        # The same where the picture ends there.
+        top = slice(0, row), slice(0, labels.shape[1])
+        part = replace(view, depth=view.depth[top], intrinsics=msgspec.structs.replace(view.intrinsics, height=row))
+        shown = cut_off.update(part, labels[top])
+    assert not any(capsule.kind == "post" for capsule in capsules)
+    assert any(capsule.kind == "trunk" for capsule in capsules) and known.rejected["post", "above the cordon"] == 1
+    assert any(capsule.kind == "post" for capsule in shown), "nobody has seen that it has no foot"
 
 
 def test_two_things_far_apart_and_at_different_heights_are_not_one_wire():

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from perception.segmentation.frame import View
+from perception.segmentation.frame import BACKGROUND, CORDON, POST, TRUNK, View
 from perception.skeleton.fragments import CANE
 from perception.tracking.presence import wood_presence
 from rolling_panda.messages.robot import Intrinsics
@@ -15,9 +15,9 @@ from rolling_panda.messages.robot import Intrinsics
 AT = np.array([0.0, 0.0, 0.8])
 
 
-def view(behind=3.0, cane_depth=0.8, cols=slice(78, 83)):
+def view(behind=3.0, cane_depth=0.8, cols=slice(78, 83), kind=BACKGROUND):
     """A camera at the origin of odom, looking along z at one upright cane before something."""
-    labels, depth = np.zeros((120, 160), np.uint8), np.full((120, 160), behind, np.float32)
+    labels, depth = np.full((120, 160), kind, np.uint8), np.full((120, 160), behind, np.float32)
     labels[:, cols], depth[:, cols] = CANE, cane_depth
     return View(0, 0.0, Intrinsics(160, 120, 200.0, 200.0, 79.5, 59.5), depth, labels, b"", np.eye(3), np.zeros(3))
 
@@ -30,6 +30,11 @@ def view(behind=3.0, cane_depth=0.8, cols=slice(78, 83)):
         (view(), AT + [0.05, 0.0, 0.0], "gone"),
         (view(cane_depth=0.9), AT, "gone"),
         (view(behind=0.5), AT + [0.05, 0.0, 0.0], "not visible"),
+        (view(behind=0.9, kind=POST), AT + [0.05, 0.0, 0.0], "not visible"),
+        (view(behind=0.9, kind=TRUNK), AT + [0.05, 0.0, 0.0], "not visible"),
+        (view(behind=0.0, kind=POST), AT + [0.05, 0.0, 0.0], "not visible"),
+        (view(behind=1.0, kind=POST), AT + [0.05, 0.0, 0.0], "gone"),
+        (view(behind=0.9, kind=CORDON), AT + [0.05, 0.0, 0.0], "gone"),
         (view(cane_depth=0.0), AT, "not visible"),
         (view(cane_depth=6.5535), AT, "not visible"),
         (view(), AT + [0.5, 0.0, 0.0], "not visible"),

@@ -97,6 +97,27 @@ def test_where_most_looks_cut_an_internode_is_taken_whole_not_half_way_to_where_
     assert point.position[1] == pytest.approx(0.0895, abs=1e-3)
 
 
+def test_a_point_is_where_most_looks_see_the_cane_not_half_way_to_where_a_few_saw_another():
+    tracker = Tracker(CONFIG)
+    for z in (0.8, 0.801, 0.828, 0.799, 0.826, 0.8):
+        (point,) = feed(tracker, view(), proposal(z=z)).points or (None,)
+    assert point.position == pytest.approx((0.0, 0.0, 0.8), abs=1e-3)
+    # It follows when most of the newest looks agree on another place.
+    for _ in range(CONFIG.averaging_window):
+        (point,) = feed(tracker, view(depth=0.826), proposal(z=0.826)).points
+    assert point.position == pytest.approx((0.0, 0.0, 0.826), abs=1e-3)
+
+
+def test_a_close_up_counts_as_much_as_all_looks_before_it():
+    tracker = Tracker(CONFIG)
+    for _ in range(5):
+        (point,) = feed(tracker, view(), proposal()).points or (None,)
+    tracker.refine(point.point_id, np.array([0.005, 0.0, 0.8]))
+    for _ in range(5):
+        (point,) = feed(tracker, view(), proposal()).points
+    assert point.position == pytest.approx((0.005, 0.0, 0.8), abs=2e-3)
+
+
 def test_a_point_is_where_it_says_it_is_also_after_a_small_step_along_its_internode():
     def look(offset):
         one = proposal(y=0.1 - offset)
