@@ -23,6 +23,7 @@ BENCHMARKS = {
         "benchmarks.control.approach",
         "the arm's ways to cuts among wood that stays, beside planners of OMPL",
     ),
+    "oracle": ("benchmarks.control.oracle", "right cuts that have a plan where everything is known"),
     "arm": ("benchmarks.control.arm", "the arm alone between random poses, beside published figures"),
     "contact": (
         "benchmarks.control.contact",

@@ -1,0 +1,76 @@
+"""The benchmark of what could be cut where everything is known."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.__main__ import main
+from benchmarks.control import oracle
+from benchmarks.control.cut_truth import wanted_cuts
+from bridge.sim.vineyard.config import VineyardConfig
+from bridge.sim.vineyard.grow import grow
+from bridge.sim.vineyard.row import Rod
+from bridge.sim.vineyard.truth import staying_rods
+
+ROW = grow(VineyardConfig(vines=1), 7900)
+
+
+@pytest.fixture(scope="module")
+def searching() -> oracle.Oracle:
+    return oracle.Oracle()
+
+
+def test_all_that_stays_is_in_the_way_and_what_goes_is_not():
+    capsules = oracle.obstacles_of(ROW).capsules
+    assert {capsule.kind for capsule in capsules} == {"post", "trunk", "cordon", "wire", "hose", "cane"}
+    canes = [capsule for capsule in capsules if capsule.kind == "cane"]
+    assert len(canes) == len(staying_rods(ROW))
+    lines = oracle.cane_lines(ROW)
+    standing = {(rod.vine, rod.spur, rod.cane) for _, rod in ROW.standing() if rod.kind == "cane" and rod.organ < 0}
+    assert len(lines) == len(standing) and all(len(line) > 2 for line in lines)
+
+
+def test_a_cut_may_be_shifted_only_where_it_stays_right():
+    for wanted in wanted_cuts(ROW):
+        if (cut := wanted.cut) is None:
+            continue
+        point = oracle.point_of(ROW, wanted, cut)
+        for along in (-point.inward, 0.0, point.outward):
+            assert cut.holds(cut.rod, np.array(point.position) + along * np.array(point.tangent) * 0.999)
+
+
+def test_a_cut_has_a_plan_and_has_none_where_a_post_stands_beside_it(searching):
+    wanted = next(each for each in wanted_cuts(ROW) if each.cut is not None and each.kind == "spur cut")
+    plan, reason = searching.search(ROW, wanted, wanted.cut)
+    assert plan is not None and reason == ""
+    assert np.linalg.norm(plan.poses.cut.translation - wanted.cut.best) < 0.008
+    foot = wanted.cut.best + (0.0, -0.06, 0.0)
+    post = Rod("post", foot * (1.0, 1.0, 0.0), foot * (1.0, 1.0, 0.0) + (0.0, 0.0, 1.9), 0.038, 0.038)
+    blocked = replace(ROW, rods=(*ROW.rods, post))
+    plan, reason = searching.search(blocked, wanted, wanted.cut)
+    assert plan is None and "post" in reason
+
+
+def test_the_command_tells_shares_and_reasons_and_writes_every_cut(tmp_path, capsys):
+    path = tmp_path / "oracle.json"
+    assert main(["oracle", "--seed", "7900", "--count", "1", "--json", str(path)]) == 0
+    document = json.loads(path.read_text())
+    assert len(document["results"]) == sum(wanted.cut is not None for wanted in wanted_cuts(ROW))
+    room = document["summary"]["room"]
+    assert room["n"] == sum(not each["blocked"] for each in document["results"]) > 10
+    assert 0.8 < room["value"] <= 1.0
+    lacking = [each for each in document["results"] if not each["planned"] and not each["blocked"]]
+    told = capsys.readouterr().out
+    assert all(each["reason"] in told for each in lacking) and len(lacking) == round((1.0 - room["value"]) * room["n"])
+
+
+def test_rows_without_a_cut_and_wrong_numbers_are_told(monkeypatch, capsys):
+    monkeypatch.setattr(oracle, "wanted_cuts", lambda row: ())
+    assert oracle.main(["--count", "1"]) == 0
+    assert "No row has a right cut" in capsys.readouterr().out
+    for words in (["--count", "0"], ["--vines", "0"]):
+        with pytest.raises(SystemExit) as end:
+            oracle.main(words)
+        assert end.value.code == 2 and "at least 1" in capsys.readouterr().err
