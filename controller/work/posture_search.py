@@ -147,9 +147,10 @@ APPROACHES: tuple[Approach, ...] = (
 )
 #: Tilts for an azimuth set by a person (rad), in order of preference.
 TILTS = (0.0, 0.2, 0.26, -0.26)
-#: Where none of these has room: turns, tilts and leans in all combinations, the smallest first. On a stub the blades
-#: lean more, as a person's shears do, to pass the cane that stays.
-_TURNS, _TILTS, _LEANS, _STUB_LEANS = (0.0, 0.35, 0.7), (0.0, 0.13, 0.26), (0.0, 0.13, 0.26), (0.0, 0.2, 0.4, 0.6, 0.8)
+#: Where none of these has room: turns, tilts and leans in all combinations, the smallest first. The blades lean to pass
+#: a cane that stays, as a person's shears do: a slanting cut is usual between nodes, and on a stub more so.
+_TURNS, _TILTS = (0.0, 0.35, 0.7), (0.0, 0.13, 0.26)
+_LEANS, _STUB_LEANS = (0.0, 0.13, 0.26, 0.4, 0.55), (0.0, 0.2, 0.4, 0.6, 0.8)
 #: Places of a cut along its wood in order of preference (m), as far as its point allows them.
 _ALONG = (0.0, 0.0025, -0.0025, 0.005, -0.005, 0.007)
 #: An approach that differs from a tried one by this is another one (rad), and room beside a cane that was met which is

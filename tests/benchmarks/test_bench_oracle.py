@@ -53,6 +53,13 @@ def test_a_cut_has_a_plan_and_has_none_where_a_post_stands_beside_it(searching):
     assert plan is None and "post" in reason
 
 
+def test_blades_slant_to_pass_a_cane_that_stays_beside_a_cut_between_nodes(searching):
+    row = grow(VineyardConfig(vines=1), 8000)
+    wanted = next(each for each in wanted_cuts(row) if (each.spur, each.kind) == (2, "spur cut"))
+    plan, _ = searching.search(row, wanted, wanted.cut)
+    assert plan is not None and 0.26 < abs(plan.approach[2]) <= 0.55
+
+
 def test_the_command_tells_shares_and_reasons_and_writes_every_cut(tmp_path, capsys):
     path = tmp_path / "oracle.json"
     assert main(["oracle", "--seed", "7900", "--count", "1", "--json", str(path)]) == 0
