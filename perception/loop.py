@@ -183,7 +183,7 @@ class PerceptionProcess:
             self._picture_sent = now
         self._tell_camera(now)
         self._tell_localisation(now)
-        if self._calibration is not self._calibration_told:
+        if self._calibration != self._calibration_told:
             self._calibration_told = self._calibration
             self._out.append(self._calibration)
         self._beat(now)

@@ -51,6 +51,8 @@ from tests.support.worlds.closed_loop import ClosedLoop
 #: may be reached by the plan from the last cut.
 _OPEN: tuple[m.PointState, ...] = ("ACCEPTED", "UNREACHABLE", "CUTTING")
 _SURVEY_S = 6.0
+#: Most checks of the camera: after a correction the row is looked at anew.
+_CHECKS = 2
 _LOOK_S, _LIMIT_S = 3.0, 120.0
 #: After the work, in which the last close-up is taken (s).
 _AFTER_S = 3.0
@@ -92,7 +94,7 @@ def cut_row(
         plans: False works without the session's plan.
         looks: False cuts without the closer looks before and after.
         segmenter: In place of the configured one.
-        checked: The camera is checked first, and a correction that is offered is used.
+        checked: The camera is checked first; corrections that are offered are used, and it is checked again.
         localise: The camera's inertial sensors and the wood that it has seen correct the odometry.
         supervised: A played person lets the work go on after a stop, at most a few times.
         frame_time_offset: By how much the bridge takes pictures to be later than their times tell (s).
@@ -294,15 +296,30 @@ def named(touched: dict[Cane, set[str]]) -> dict[str, str]:
 
 
 def _check_camera(loop: ClosedLoop) -> str:
-    """Check the camera and use the correction that is offered; returns the warning, empty without one."""
+    """Check the camera, use what corrections are offered, and check again; returns the first warning, empty without."""
+    warned = ""
     loop.run(1.0)
     loop.command(intents.Arm(user="bench"))
-    loop.command(intents.CheckCamera(user="bench"))
-    loop.run_until(lambda: loop.controller.mode != "AUTO", _LIMIT_S)
-    state = loop.perception.camera.state
-    if state.offer is not None:
-        loop.perception.answer(intents.UseCamera(user="bench", made_at=state.offer.made_at))
-    return "" if state.warning is None else text_of(state.warning)
+    for _ in range(_CHECKS):
+        loop.command(intents.CheckCamera(user="bench"))
+        loop.run_until(lambda: loop.controller.mode != "AUTO", _LIMIT_S)
+        warning = loop.perception.camera.state.warning
+        warned = warned or ("" if warning is None else text_of(warning))
+        if not _use_corrections(loop):
+            break
+    return warned
+
+
+def _use_corrections(loop: ClosedLoop) -> bool:
+    """Use the corrections of the camera and of its clock that are offered; whether there were any."""
+    loop.run(1.0)
+    offer, timing = loop.perception.camera.state.offer, loop.perception.robot_calibration.timing
+    if offer is not None:
+        loop.perception.answer(intents.UseCamera(user="bench", made_at=offer.made_at))
+    if timing is not None:
+        loop.command(intents.UseTiming(user="bench", made_at=timing.made_at))
+        loop.run(1.0)
+    return offer is not None or timing is not None
 
 
 def _accept(loop: ClosedLoop, points: int) -> list[m.QueueEntry]:

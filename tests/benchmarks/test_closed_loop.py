@@ -5,8 +5,11 @@ import math
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
+from benchmarks.control.row import sim_config
 from bridge.sim.robot import trace
+from bridge.sim.world.config import CALM
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from tests.support.worlds.closed_loop import ClosedLoop
@@ -84,3 +87,32 @@ def test_the_same_seed_gives_the_same_trace(tmp_path: Path, seed: int) -> None:
         loop.close()
         digests.append(hashlib.sha256((tmp_path / name).read_bytes()).hexdigest())
     assert digests[0] == digests[1]
+
+
+@pytest.mark.long
+def test_late_pictures_are_corrected_by_what_a_check_of_the_camera_tells(tmp_path: Path) -> None:
+    late = replace(CALM, frame_delay=0.04)
+    with ClosedLoop(5300, tmp_path / "trace", sim_config(tmp_path / "row.toml", 2.0, late), segmenter="labels") as loop:
+
+        def check() -> float:
+            """Check the camera; the delay that is left (s)."""
+            assert loop.command(intents.CheckCamera(user="test")).ok
+            assert loop.run_until(lambda: loop.controller.mode != "AUTO", 60.0)
+            assert loop.perception.camera.state.time_offset is not None
+            return loop.perception.camera.state.time_offset
+
+        loop.run(1.0)
+        assert loop.command(intents.Arm(user="test")).ok
+        assert check() > 0.025
+        loop.run(1.0)
+        offer = loop.perception.robot_calibration.timing
+        assert offer is not None
+        assert not loop.command(intents.UseTiming(user="test", made_at=offer.made_at - 1.0)).ok, (
+            "another one than was seen"
+        )
+        assert loop.command(intents.UseTiming(user="test", made_at=offer.made_at)).ok
+        loop.run(1.0)
+        told = loop.inbox.newest(m.BridgeState)
+        assert told is not None and told.message.timing == offer
+        assert abs(check()) < 0.012 and loop.perception.robot_calibration.timing is None
+        assert list(loop.queue("PROPOSED"))

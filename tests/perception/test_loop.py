@@ -197,6 +197,12 @@ def test_what_pictures_of_the_board_tell_is_sent_when_it_changes(parts):
     perception.robot_calibration = RobotCalibration(header=m.Header(1.0), base_views=4)
     loop.see("frame", 1.0)
     step_until(loop, lambda: told[-1].base_views == 4, 1.0)
+    # Each frame computes it anew; the same one is not sent again.
+    perception.robot_calibration = RobotCalibration(header=m.Header(1.0), base_views=4)
+    loop.see("another", 2.0)
+    step_until(loop, lambda: perception.processed == 2, 2.0)
+    loop.step(2.5)
+    assert [state.base_views for state in told] == [0, 4]
 
 
 def test_what_was_left_out_is_told_when_it_changes_and_at_most_once_a_minute(parts):

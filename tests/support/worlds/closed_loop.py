@@ -18,7 +18,7 @@ from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.closing import Closing
 from rolling_panda.config import RobotConfig, load_section
-from rolling_panda.messages.perception import BASE, ON_THE_WAY, Obstacles
+from rolling_panda.messages.perception import ON_THE_WAY, Obstacles
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.messages.supervision import Person, Presence, SessionPlan
 from rolling_panda.model.differential_drive import Array
@@ -45,6 +45,7 @@ class PerceptionInTime:
         self._frame: Received[CameraFrame] | None = None
         self._made: deque[tuple[float, m.Message]] = deque()
         self._busy_until = 0.0
+        self._told = perception.robot_calibration
         self._beats = 0
 
     def step(self, inbox: Inbox, now: float) -> list[object]:
@@ -63,8 +64,9 @@ class PerceptionInTime:
             obstacles = Obstacles(header=points.header, capsules=self._perception.obstacles)
             for message in (points, obstacles, self._perception.localisation):
                 self._made.append((now + _PERCEPTION_S, message))
-            if frame.message.point_id.startswith(BASE):
-                self._made.append((now + _PERCEPTION_S, self._perception.calibrator.state))
+            if (calibration := self._perception.robot_calibration) != self._told:
+                self._told = calibration
+                self._made.append((now + _PERCEPTION_S, calibration))
         return self._due(now)
 
     def _due(self, now: float) -> list[object]:
