@@ -50,7 +50,9 @@ def draw_world(folder: Path, figure: Figure) -> None:
         below = [value - 100 * point["low"] for value, (_, point) in zip(values, shown, strict=True)]
         above = [100 * point["high"] - value for value, (_, point) in zip(values, shown, strict=True)]
         panel.errorbar(places, values, [below, above], color=_COLOUR, marker="o", ms=4, capsize=2)
-        panel.set_title(f"{name} (n {min((point['n'] for _, point in shown), default=0)})", fontsize=9)
+        counts = sorted({point["n"] for _, point in shown}) or [0]
+        n = str(counts[0]) if len(counts) == 1 else f"{counts[0]}–{counts[-1]}"
+        panel.set_title(f"{name} (n {n})", fontsize=9)
         panel.set_xticks(range(len(_LEVELS)), _LEVELS)
         panel.set_ylim(-3, 103)
     for panel in panels[len(names) :]:

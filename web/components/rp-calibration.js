@@ -113,11 +113,17 @@ function newPart(part, robot) {
   return offer && offer.made_at !== pageState.get()?.bridge?.[part]?.made_at ? offer : null;
 }
 
+/** Why the last calibration of a part gave no new one; null if it gave one, and before the first. @param {Part} part @param {RobotCalibration|null} robot */
+function refusalOf(part, robot) {
+  // Ordinary work refuses nothing.
+  return !robot || part === "timing" || robot[`${part}_views`] === 0 ? null : robot[`${part}_refused`];
+}
+
 /** What is in use for a part, and what is new. @template {Part} P @param {P} part @param {RobotCalibration|null} robot */
 function partWords(part, robot) {
   const used = pageState.get()?.bridge?.[part];
   const offer = newPart(part, robot);
-  const refused = part !== "timing" && robot?.[`${part}_views`] ? robot[`${part}_refused`] : null;
+  const refused = refusalOf(part, robot);
   const found = offer ? measuredWords(offer) : refused ? reasonText(refused) : text("calibration.none");
   const words = { [part]: used ? measuredWords(used) : text(`calibration.${part}_drawn`), [`${part}_offer`]: robot ? found : text("calibration.untold") };
   return /** @type {Record<P|`${P}_offer`, string>} */ (words);
