@@ -402,7 +402,7 @@ class UseArm(Intent, frozen=True, kw_only=True):
 
 
 class UseTiming(Intent, frozen=True, kw_only=True):
-    """Use the new calibration of the camera's clock from now on. It moves nothing.
+    """Use the new calibration of the camera's clock from now on. It moves nothing. All points are looked for anew.
 
     Attributes:
         made_at: `made_at` of the calibration that the operator saw.
