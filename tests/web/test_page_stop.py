@@ -2,7 +2,7 @@
 
 import msgspec
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
 from rolling_panda import reasons
 from rolling_panda.messages import page as p
@@ -99,6 +99,22 @@ def test_no_notice_lies_over_the_field_for_the_reason(page: Page, server: Played
     field = box_of(page.locator("rp-stop-banner input"))
     notice = box_of(page.locator(".toast").first)
     assert notice["y"] + notice["height"] <= field["y"]
+
+
+def test_an_answer_that_comes_after_the_reset_forbids_nothing(page: Page, server: PlayedServer) -> None:
+    working(page, server)
+    start, held = page.locator("#start"), list[Route]()
+    page.route("**/api/stop", lambda route: held.append(route))
+    page.locator("#stop").click()
+    expect(start).to_be_disabled()
+    server.bridge = bridge(stop_id="s1", stopped_by=reasons.software_stop("Ada", said("stop button")))
+    show_mode(page, server, controller("ESTOP_LATCHED", reason="stopped by Ada"))
+    server.bridge = bridge()
+    show_mode(page, server, ready())
+    with page.expect_response("**/api/stop"):
+        held[-1].fulfill(json={"ok": True})
+    page.wait_for_timeout(300)
+    expect(start).to_be_enabled()
 
 
 def test_nothing_starts_between_the_press_and_its_confirmation(page: Page, server: PlayedServer) -> None:

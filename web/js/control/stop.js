@@ -30,7 +30,8 @@ export async function stopRobot(reason) {
     // At the root path: stops every robot of this server.
     const answer = await post("/api/stop", { reason, press }, 1000);
     if (answer.ok) {
-      stopProgress.set("sent");
+      // The robot may have told of the stop before this answer came.
+      if (stopProgress.get() === "sending") stopProgress.set("sent");
       return;
     }
     refusal = answer.why;
