@@ -6,6 +6,7 @@ from msgspec import Meta, Struct
 
 from rolling_panda.bounds import at_least, at_most
 from rolling_panda.config import ArmPosture, Positive
+from rolling_panda.messages.robot import Delay
 from rolling_panda.topics import JOINTS
 
 NotNegative = Annotated[float, Meta(ge=0.0, le=1.0)]
@@ -75,6 +76,6 @@ class BridgeConfig(Struct, frozen=True, forbid_unknown_fields=True):
     joints_hz: Annotated[float, at_least(50.0, 1000.0)] = JOINTS.rate_hz
     camera_moving_hz: Positive = 2.0
     camera_resting_hz: Positive = 0.5
-    frame_time_offset: Annotated[float, Meta(ge=-0.2, le=0.2)] = 0.0
+    frame_time_offset: Delay = 0.0
     inertial: bool = False
     odometry: OdometryConfig = OdometryConfig()

@@ -1,8 +1,7 @@
 """`rolling-panda bench oracle`: for which right cuts the search of plans finds one where everything is known.
 
-Grown rows, without a simulation and without perception: the search gets the right cuts and all wood by the truth. What
-it finds no plan for here, no perception could have let the robot cut. The search and its distances are those of the
-controller.
+Grown rows before the first cut, without a simulation and without perception: the search gets the right cuts and all
+wood by the truth. The search and its distances are those of the controller.
 """
 
 import time
@@ -22,6 +21,7 @@ from bridge.sim.vineyard.row import Row
 from bridge.sim.vineyard.truth import KEPT_NODES, RightCut, staying_rods
 from controller.config import ControllerConfig
 from controller.work.posture_search import CutClearance, CutPlan, PostureSearch, completed
+from perception.rules.pruning import INWARD, OUTWARD
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.config import RobotConfig, load_section
@@ -34,8 +34,6 @@ from rolling_panda.transport.inbox import Received
 
 #: Wood that stands in the way and is never cut.
 _FIXED = ("post", "trunk", "cordon", "wire", "hose")
-#: Largest shift of a cut along its wood where the blades have no room, as perception allows it (m).
-_INWARD, _OUTWARD = 0.005, 0.007
 
 
 @dataclass(frozen=True)
@@ -110,8 +108,8 @@ def point_of(row: Row, wanted: WantedCut, cut: RightCut) -> m.PruningPoint:
         spur=wanted.spur,
         kind=wanted.kind,
         cane=staying if wanted.cane == STUB else wanted.cane,
-        inward=min(_INWARD, -cut.past_best(cut.least)),
-        outward=min(_OUTWARD, cut.past_best(cut.most)),
+        inward=min(INWARD, -cut.past_best(cut.least)),
+        outward=min(OUTWARD, cut.past_best(cut.most)),
     )
     return replace(point, digest=point_digest(point))
 
@@ -191,9 +189,9 @@ def main(argv: Sequence[str]) -> int:
     for name, each in summary.items():
         told = "" if each.value is None else f"{each.value:.3f}   95 % {each.low:.3f} to {each.high:.3f}   "
         print(f"{name:<24}{told}n {each.n}")
-    for each_found in found:
-        if each_found.reason and not each_found.blocked:
-            print(f"  {each_found.seed}, spur {each_found.spur}, {each_found.kind}: {each_found.reason}")
+    for cut in found:
+        if cut.reason and not cut.blocked:
+            print(f"  {cut.seed}, spur {cut.spur}, {cut.kind}: {cut.reason}")
     results = [asdict(each) for each in found]
     figures = {name: asdict(each) for name, each in summary.items()}
     write(words.json, {"seed": words.seed, "count": words.count, "summary": figures, "results": results})

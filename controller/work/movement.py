@@ -155,7 +155,7 @@ class Movement:
         self._homing = Homing(self._config, self.body.follower, self.body.dt)
 
     def stopped_by_contact(self) -> m.Reason | None:
-        """Put off the present cut after a contact; returns what is logged."""
+        """Put off the present cut after a contact, and return what to log."""
         touch, robot = self.body.contact.touch, self.body.measured
         return None if touch is None or robot is None else self.sequence.stopped_by(touch, robot.frame)
 

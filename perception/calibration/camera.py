@@ -100,7 +100,9 @@ class CameraCalibration:
         )
 
     def follow(self, offsets: JointOffsets, delay: float = 0.0) -> bool:
-        """The calibrations that the bridge now uses; whether it used others before, so that what was seen is off.
+        """Take in the calibrations that the bridge uses; returns whether one has changed.
+
+        Then what was seen before is off.
 
         A camera that was measured together with these offsets is offered from now on; nothing else that was measured
         before fits.

@@ -35,7 +35,7 @@ _VISIBLE_HALF_WIDTH = 0.008
 _DOUBTFUL = 0.5
 #: Largest shift of a cut from its best place towards the last kept node, and away from it (m), where the blades have no
 #: room. With an offset of 20 mm the cut stays 10 to 30 mm past the node, also if its place is off by 3 mm.
-_INWARD, _OUTWARD = 0.005, 0.007
+INWARD, OUTWARD = 0.005, 0.007
 #: Spacing of places that are looked at for that (m).
 _PLACE_STEP = 0.001
 #: Turns, tilts and leans of the blades in a renewal cut, as shares of the largest.
@@ -336,8 +336,8 @@ def _shorten(
         offset=arc - last,
         node_distance=node_distance(cane, nodes[:kept], cane.at(arc)),
         cane=cane.number,
-        inward=_free(arc - (best - _INWARD), lambda shift: allowed(arc - shift)),
-        outward=_free(best + _OUTWARD - arc, lambda shift: allowed(arc + shift)),
+        inward=_free(arc - (best - INWARD), lambda shift: allowed(arc - shift)),
+        outward=_free(best + OUTWARD - arc, lambda shift: allowed(arc + shift)),
     )
 
 

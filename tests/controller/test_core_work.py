@@ -219,9 +219,8 @@ def test_refusals_say_why_and_allowed_agrees_with_them():
     about_points |= {"MoveInQueue", "SetApproach"}
     possible = {name for name, reason in r.state.allowed.items() if reason is None}
     postures = {"SavePosture", "DeletePosture", "CheckPosture"}
-    assert (
-        possible == {"Arm", "RequirePreview", "UseArm", "UseBase", "UseCamera", "UseTiming"} | postures | about_points
-    )
+    calibrations = {"UseArm", "UseBase", "UseCamera", "UseTiming"}
+    assert possible == {"Arm", "RequirePreview"} | calibrations | postures | about_points
     told = {command.name for command in COMMANDS if command.process == "controller" and command.tag != "control"}
     told.add("UseCamera")
     assert set(r.state.allowed) == told | {"Teleoperation"}
