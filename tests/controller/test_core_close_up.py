@@ -121,10 +121,10 @@ def test_blades_do_not_close_over_a_cane_that_stays_where_the_cut_is_seen(monkey
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_cane_that_the_map_has_between_the_blades_is_not_cut_either(monkeypatch, side):
     """It becomes known with the picture, which shows the cut farther from it: perhaps all wood is shifted alike."""
-    news = cane(CUT[0] + 0.014 * side, CUT[1] + 0.014, foot=0.9, top=1.3, spur=2, number=0)
-    r, deepest = work(monkeypatch, off=(-0.02 * side, 0.0, 0.0), news=(news,))
+    news = cane(CUT[0] + 0.006 * side, CUT[1] + 0.006, foot=0.9, top=1.3, spur=2, number=0)
+    r, deepest = work(monkeypatch, off=(-0.03 * side, 0.0, 0.0), news=(news,))
     for _, T in r.cuts:
-        at_map = T[:3, 3] + [0.02 * side, 0.0, 0.0]
+        at_map = T[:3, 3] + [0.03 * side, 0.0, 0.0]
         # Where the upright cane passes the plane of the blades, which may lean.
         level = T[:3, :3].T @ (np.array([news.start[0], news.start[1], T[2, 3]]) - at_map)
         upwards = T[2, :3]
