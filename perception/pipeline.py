@@ -30,6 +30,7 @@ from perception.skeleton.topology import perceive_plant, trace_canes
 from perception.tracking.camera_rays import CameraRays, Ray
 from perception.tracking.close_up import AROUND, check_close_up, failed_check
 from perception.tracking.cut_sight import CutFollower, unseen
+from perception.tracking.picture_shift import UNSHIFTED
 from perception.tracking.retained_canes import RetainedCanes
 from perception.tracking.spur_pictures import SpurPictures
 from perception.tracking.tracker import Proposal, Tracker, TrackerUpdate
@@ -140,6 +141,8 @@ class Perception:
         self.pictures: tuple[SpurPicture, ...] = ()
         """Pictures of the spurs with a published point, and of the undecided ones."""
         self._follower = CutFollower(config)
+        self._shifts: dict[str, Array] = {}
+        """By how much the last close-up that showed a point was shifted against the map (m), by point."""
         self._undo: list[_RuleSnapshot] = []
         self._severed: list[Array] = []
         """Positions where wood was found cut."""
@@ -276,12 +279,17 @@ class Perception:
             view = self.row_frame.in_map(view)
             known = self.plant_map.around(np.array(point.position), AROUND)
             lift = self.row_frame.lift(np.array(point.position))
-            check = check_close_up(view, self.segmenter, point, frame.number, self._config, known, lift)
+            expected = self._shifts.get(point.point_id, UNSHIFTED)
+            check, shift = check_close_up(
+                view, self.segmenter, point, frame.number, self._config, known, lift, expected
+            )
         except UnusablePictureError as error:
             return failed_check(frame, error.reason)
         self._follower.begin(check, point.kind == "renewal cut")
         if check.position is not None:
-            self._tracker.refine(point.point_id, np.array(check.position))
+            self._shifts[point.point_id] = shift
+            # In the map, which is not shifted with the picture.
+            self._tracker.refine(point.point_id, np.array(check.position) - shift)
         return self.row_frame.check_in_odom(check)
 
     def see_cut(self, frame: CameraFrame) -> CutSight:
@@ -306,7 +314,8 @@ class Perception:
     def _locate(self, view: View) -> None:
         """Find where the robot is from a close-up frame: the base has moved since it was known."""
         labels = self.segmenter.segment(view)
-        self.row_frame.update(view, labels, trace_canes(view, labels, self._config.skeleton))
+        lines = trace_canes(view, labels, self._config.skeleton, measured_only=True)
+        self.row_frame.update(view, labels, lines, near=True)
 
     @property
     def config(self) -> PerceptionConfig:
@@ -383,6 +392,7 @@ class Perception:
         self.withdrawn = self._tracker.withdraw_all()
         self.plant_map, self._spur_pictures, self._undecided = PlantMap(), SpurPictures(), UndecidedSites()
         self._undo, self._severed, self._cane_lines, self._site_messages = [], [], (), ()
+        self._shifts = {}
         self.row_frame.forget()
 
     def _add(self, request: AddPoint) -> m.Answer:

@@ -75,7 +75,7 @@ class CloseCamera:
         frame = camera_frame(image, self._camera, self._base, self._position, self._taken)
         view = replace(decode_frame(frame, self._model), R=T_odom_camera[:3, :3], t=T_odom_camera[:3, 3])
         known = self._known.around(np.array(point.position), AROUND)
-        return check_close_up(view, self._segmenter, point, self._taken, self._config, known)
+        return check_close_up(view, self._segmenter, point, self._taken, self._config, known).result
 
     @property
     def T_tool_camera(self) -> Array:

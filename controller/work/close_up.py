@@ -2,13 +2,15 @@
 
 After a cut the cutter reports whether the blades met resistance, and the camera whether the wood beyond is gone. If
 both report an intact cane, it is cut once more. If they contradict each other, an operator decides. A cane that the
-camera sees beside the cut, rather than in it, was severed and hangs.
+camera sees beside the cut, rather than in it, was severed and hangs. A cane that sways is cut where it is in the mean.
 """
 
+import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+from msgspec.structs import replace
 
 from controller.config import WorkConfig
 from controller.motion.follower import Measured
@@ -19,25 +21,59 @@ from rolling_panda import reasons
 from rolling_panda.messages.perception import CloseUpResult, Finding, PruningPoint
 from rolling_panda.messages.types import Outcome, PointState, Reason
 from rolling_panda.model.differential_drive import Array
+from rolling_panda.model.wire_values import vector3
 
 #: A request is repeated this often until its picture has come (s).
 _REPEAT_S = 0.05
 #: A picture without a result after this time (s) counts as lost and is requested again.
 _LOST_S = 1.5
+#: A cane that pictures show within this of each other, or of where it is expected, does not sway (m).
+_STILL = 0.005
+#: So many pictures of a cane that sways tell where it is in the mean.
+_SWAYING = 3
 
 
 @dataclass
 class _Asked:
-    """A close-up in progress: expected finding, newest request, first request that counts, pictures that came."""
+    """A close-up in progress.
+
+    Attributes:
+        expected: Finding.
+        place: Where the cane is expected (3, m, odom); None counts any place as the expected one.
+        number: Of the newest request.
+        first: Number of the first request that counts.
+        came: Pictures that came.
+        seen: What those told that showed the cane.
+        begun: When it was requested (s).
+        since: When its newest picture was (s).
+        sent_at: When that request was sent last (s).
+        answer: Result; None while it is pending.
+    """
 
     expected: Finding
+    place: Array | None
     number: int
     first: int
-    came: int
     begun: float
     since: float
+    came: int = 0
+    seen: list[CloseUpResult] = field(default_factory=list)
     sent_at: float = -math.inf
     answer: CloseUpResult | None = None
+
+    def sways(self) -> bool:
+        """Whether the pictures show the cane at different places, or the only one not where it is expected."""
+        places = [self.place] if len(self.seen) == 1 and self.place is not None else []
+        places += [np.array(each.position) for each in self.seen if each.position is not None]
+        return any(math.dist(one, other) > _STILL for one, other in itertools.combinations(places, 2))
+
+    def mean(self) -> CloseUpResult:
+        """The last picture that showed the cane, with the mean place: where it sways, of the expected one too."""
+        last, sways = self.seen[-1], len(self.seen) > 1 and self.sways()
+        places = [each.position for each in self.seen if each.position is not None]
+        if sways and self.place is not None:
+            places.append(vector3(self.place))
+        return replace(last, position=vector3(np.mean(places, axis=0))) if len(places) > 1 else last
 
 
 class CloseUpClient:
@@ -58,10 +94,14 @@ class CloseUpClient:
         #: Time from the request to the result, of the last picture that came (s).
         self.took_s = 0.5
 
-    def ask(self, point_id: str, expected: Finding, now: float) -> None:
-        """Request a close-up of a point. A result that is not as expected is checked with another picture."""
+    def ask(self, point_id: str, expected: Finding, now: float, place: Array | None = None) -> None:
+        """Request a close-up of a point.
+
+        A result that is not as expected is checked with another picture, and so is a cane that is seen elsewhere than
+        at its `place` (3, m, odom): where it sways, the answer has its mean place.
+        """
         self._number += 1
-        self._asked[point_id] = _Asked(expected, self._number, self._number, 0, now, now)
+        self._asked[point_id] = _Asked(expected, place, self._number, self._number, now, now)
 
     def forget(self, point_id: str) -> None:
         """Drop the close-up of this point."""
@@ -74,12 +114,20 @@ class CloseUpClient:
         if asked is None or not asked.first <= result.number <= asked.number or asked.answer is not None:
             return
         asked.came += 1
-        most = self._blind if result.finding == "unseen" else self._pictures
-        if result.finding != asked.expected and asked.came < most:
+        as_expected = result.finding == asked.expected
+        if as_expected and result.position is not None:
+            asked.seen.append(result)
+        if as_expected:
+            wait = asked.place is not None and len(asked.seen) < _SWAYING and asked.sways()
+            most = self._blind
+        else:
+            wait, most = True, self._blind if result.finding == "unseen" else self._pictures
+        if wait and asked.came < most:
             self._again(asked, now)
             asked.first = asked.number
         else:
-            asked.answer, self.took_s = result, now - asked.since
+            usable = asked.seen and result.finding in (asked.expected, "unseen")
+            asked.answer, self.took_s = asked.mean() if usable else result, now - asked.since
 
     def due(self, now: float) -> tuple[int, str] | None:
         """Number and point of the request to send in this period; None when none is due."""
@@ -204,10 +252,8 @@ class PostCutCheck:
             return self._end(point_id, "UNKNOWN", reasons.gone_but(ended.report))
         if finding == "unseen":
             return self._end(point_id, ended.outcome or "UNKNOWN", reasons.unseen_after(ended.report, why))
-        if aside > _STANDS_WITHIN:
-            if done:
-                return self._end(point_id, "DONE", reasons.cut_and_hangs(1e3 * aside))
-            return self._end(point_id, "UNKNOWN", reasons.beside_but(ended.report, 1e3 * aside))
+        if aside > _STANDS_WITHIN and done:
+            return self._end(point_id, "DONE", reasons.cut_and_hangs(1e3 * aside))
         ticket = self._queue.get(point_id)
         accepted = None if ticket is None else ticket.accepted
         if self._tried.get(point_id, (None, False))[0] is not accepted or accepted is None:
@@ -217,6 +263,9 @@ class PostCutCheck:
             return reasons.cut_ended(point_id, again)
         if done:
             return self._end(point_id, "UNKNOWN", reasons.stands_unknown(ended.report))
+        if aside > _STANDS_WITHIN:
+            # It sways, or hangs by its bark.
+            return self._end(point_id, "UNKNOWN", reasons.beside_but(ended.report, 1e3 * aside))
         return self._end(point_id, "FAILED_NOT_CUT", reasons.stands_not_cut(ended.report))
 
     def _end(self, point_id: str, state: PointState, reason: Reason) -> Reason:
@@ -249,7 +298,13 @@ def not_as_accepted(close_up: CloseUpResult, ticket: Ticket | None) -> Reason | 
 
 
 def undecided(close_up: CloseUpResult) -> bool:
-    """Whether pictures came and do not tell, so that those from another side may."""
+    """Whether pictures came and do not tell, so that those from another side may.
+
+    That a cane is off which nobody has cut, or has other nodes than before, is told wrongly as well: where it sways, or
+    where pictures lack depth.
+    """
+    if close_up.finding in ("severed", "changed"):
+        return True
     return close_up.finding == "unseen" and (close_up.reason is None or close_up.reason.code != "no_close_up")
 
 

@@ -316,6 +316,11 @@ class CutTask:
         """Poses and postures in odom."""
         return self.planned.in_odom(self.frame)
 
+    @property
+    def accepted_in_odom(self) -> Array | None:
+        """Place of the acceptance (3, m, odom); None without one."""
+        return None if self.accepted is None else self.frame.position_in_odom(np.array(self.accepted.position))
+
 
 class Holds(Protocol):
     """A motion whose timeouts can leave a period out."""
@@ -638,7 +643,7 @@ class Travel(MovingStage):
         if last and not config.work.pre_cut_check:
             return Advance(parts, self._task, self._way), result
         if last and camera_ready(robot, motion, config.work):
-            parts.close_ups.ask(self.point_id, "seen", now)
+            parts.close_ups.ask(self.point_id, "seen", now, self._task.accepted_in_odom)
             timeout.again()
             return CloseUp(parts, self._task, self._way), result
         if not (config.work.pre_cut_check and timeout.over(tracking, now, 0.0)) and timeout.late(now):
@@ -730,14 +735,13 @@ class Fitting(MovingStage):
 
     def _enter(self, robot: Measured, plan: CutPlan) -> Step:
         """Straight in, to where the cut was seen."""
-        parts, motion, accepted = self._parts, self._way.motion, self._task.accepted
+        parts, motion, known = self._parts, self._way.motion, self._task.accepted_in_odom
         motion.extend(replace(parts.segments.into(self._task.plan), q_goal=plan.q_cut))
         _shift(motion, self._task.frame.position_in_odom(plan.poses.cut.translation))
         parts.servo.begin(self.point_id, self._seen, motion.goal.rotation)
         self._way.timeout.start(motion.duration)
         tracking = self._way.track(robot)
         result = StepResult(tracking.xi, tracking)
-        known = None if accepted is None else self._task.frame.position_in_odom(np.array(accepted.position))
         moved = 0.0 if known is None else math.dist(self._seen, known)
         if moved > TOLD_MOVED:
             result = result.with_event(reasons.cut_where_seen(self.point_id, 1e3 * moved))

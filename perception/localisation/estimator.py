@@ -184,12 +184,14 @@ class RowLocaliser:
             self._lost("too far without wood")
         return self.estimate
 
-    def update(self, seen: Sighting, camera: Array) -> Estimate:
+    def update(self, seen: Sighting, camera: Array, near: bool = False) -> Estimate:
         """Compare a sighting with the map, and keep it where the map has nothing yet.
 
         Args:
             seen: In odom, from the pose of the last `predict`.
             camera: Position of the camera (3, m, odom).
+            near: It shows little of the row, as a close-up does. In the wind that may be nowhere, and the robot is not
+                lost for it.
         """
         if self._late:
             return self.estimate
@@ -209,6 +211,8 @@ class RowLocaliser:
         if self._state == "lost" and (fit.explained < _FOUND or fit.bodies < _FOUND_BODIES):
             return self.estimate
         if fit.explained < _EXPLAINED or not self._correct(fit):
+            if near:
+                return self.estimate
             self._others += 1
             if self._others == _OTHERS:
                 self._lost("other wood")

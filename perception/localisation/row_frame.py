@@ -101,11 +101,11 @@ class RowFrame:
         if self._on:
             self._localiser.predict(base, stamp, inertial)
 
-    def update(self, view: View, labels: Labels, canes: Sequence[Axis]) -> None:
-        """Compare a frame, in odom, with the wood that was seen before."""
+    def update(self, view: View, labels: Labels, canes: Sequence[Axis], near: bool = False) -> None:
+        """Compare a frame, in odom, with the wood that was seen before; `near`: it is a close-up."""
         if not self._on:
             return
-        estimate = self._localiser.update(sighting(view, labels, canes), view.t)
+        estimate = self._localiser.update(sighting(view, labels, canes), view.t, near)
         if estimate.state != "located":
             return
         ahead, aside = view.t + _AHEAD * view.R[:, 2], _ASIDE * view.R[:, 0]

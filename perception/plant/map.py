@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
 from perception.arrays import Array, interpolate
@@ -17,8 +18,8 @@ from perception.plant.numbering import SpurNumber
 from rolling_panda.messages.types import Vector3
 from rolling_panda.model.wire_values import vector3
 
-#: Axes nearer to each other than this are one cane (m).
-_SAME_CANE = 0.015
+#: A cane may be seen so far from where it was seen before: in the wind, and as the camera's place errs (m).
+_SAME_CANE = 0.025
 #: Part of a cane by which two observations are aligned (m from the base), and how many of its points that takes.
 _NEAR_BASE, _ALIGNED = 0.25, 5
 #: Nodes nearer than this along a cane are one (m).
@@ -305,7 +306,7 @@ class PlantMap:
                 known.position.add(spur.position)
                 if not spur.incomplete and (known.best.incomplete or len(spur.canes) > len(known.best.canes)):
                     known.best = spur
-            seen = tuple(_associate(known, cane) for cane in spur.canes)
+            seen = _associate(known, spur.canes)
             out.append(replace(known.with_median_stub(spur), canes=seen, hidden=known.hidden_canes(seen)))
         return tuple(out)
 
@@ -348,14 +349,23 @@ class PlantMap:
         return tuple(line for spur in self.spurs for cane in spur.canes if (line := cane.line()))
 
 
-def _associate(spur: KnownSpur, cane: Cane) -> Cane:
-    """Add an observation to its cane; returns it with what other frames have shown."""
-    near = [(away, known.number) for known in spur.canes if (away := _axis_distance(known.best, cane)) < _SAME_CANE]
-    if near:
-        same = spur.canes[min(near)[1]]
-        return same.with_other_views(same.add(cane))
-    spur.canes.append(KnownCane.of(cane, len(spur.canes)))
-    return spur.canes[-1].with_other_views(cane)
+def _associate(spur: KnownSpur, canes: tuple[Cane, ...]) -> tuple[Cane, ...]:
+    """Add the canes of one frame to those that they are; returns them with what other frames have shown.
+
+    A frame shows a cane once. So each goes to another one of the map, all of them together as near as they can be.
+    """
+    away = np.array([[_axis_distance(known.best, cane) for known in spur.canes] for cane in canes])
+    away = np.minimum(away.reshape(len(canes), len(spur.canes)), _SAME_CANE)
+    same = {int(i): spur.canes[k] for i, k in zip(*linear_sum_assignment(away), strict=True) if away[i, k] < _SAME_CANE}
+    out = []
+    for i, cane in enumerate(canes):
+        known = same.get(i)
+        if known is None:
+            spur.canes.append(KnownCane.of(cane, len(spur.canes)))
+            out.append(spur.canes[-1].with_other_views(cane))
+        else:
+            out.append(known.with_other_views(known.add(cane)))
+    return tuple(out)
 
 
 def _axis_distance(first: Cane, second: Cane) -> float:

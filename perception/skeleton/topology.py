@@ -1,5 +1,7 @@
 """Plant topology: canes rooted at the spur that they touch."""
 
+from dataclasses import replace
+
 import numpy as np
 from scipy import ndimage
 from scipy.spatial import cKDTree
@@ -33,18 +35,25 @@ def perceive_plant(view: View, labels: Labels, config: SkeletonConfig) -> Plant:
         labels: H×W class indices.
         config: Skeleton and topology.
     """
-    mended = inpaint_depth(view, labels, config)
-    whole = interpolate_lost_depth(mended, labels, config)
-    return _root_canes(whole, labels, _trace(whole, labels, mended.depth > 0.0, config), config)
+    whole, measured = _mended(view, labels, config)
+    return _root_canes(whole, labels, _trace(whole, labels, measured, config), config)
 
 
-def trace_canes(view: View, labels: Labels, config: SkeletonConfig) -> list[Centreline]:
+def trace_canes(view: View, labels: Labels, config: SkeletonConfig, measured_only: bool = False) -> list[Centreline]:
     """Centre lines of the canes of one frame, not yet rooted; arguments as of `perceive_plant`.
 
-    They are only where the camera has depth: a close-up decides on what it has seen.
+    With `measured_only` they end where the camera lost depth: they tell a place in space, rather than a course.
     """
-    mended = inpaint_depth(view, labels, config)
-    return _trace(mended, labels, mended.depth > 0.0, config)
+    whole, measured = _mended(view, labels, config)
+    if measured_only:
+        whole = replace(whole, depth=np.where(measured, whole.depth, np.float32(0.0)))
+    return _trace(whole, labels, measured, config)
+
+
+def _mended(view: View, labels: Labels, config: SkeletonConfig) -> tuple[View, Mask]:
+    """The frame with depth that was lost on wood interpolated, and where depth was measured."""
+    measured = inpaint_depth(view, labels, config)
+    return interpolate_lost_depth(measured, labels, config), measured.depth > 0.0
 
 
 def _trace(view: View, labels: Labels, measured: Mask, config: SkeletonConfig) -> list[Centreline]:

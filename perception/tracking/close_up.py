@@ -6,6 +6,7 @@ After a cut it tells whether the wood beyond is gone. It never proposes a cut.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from perception.segmentation.frame import CANE, SPUR, View
 from perception.segmentation.segmenter import Segmenter
 from perception.skeleton.centreline import Centreline
 from perception.skeleton.topology import trace_canes
-from perception.tracking.picture_shift import picture_shift
+from perception.tracking.picture_shift import UNSHIFTED, PictureShift, picture_shift
 from perception.tracking.presence import wood_presence
 from rolling_panda import messages as m
 from rolling_panda import reasons
@@ -29,6 +30,17 @@ from rolling_panda.model.wire_values import vector3
 _STEP, _TANGENT_SAMPLES = 0.001, 10
 #: Wood of the map within this distance of a point tells how far its picture is shifted (m): inside the window.
 AROUND = 0.07
+#: An axis of the map nearer to the point than this may be its own cane (m).
+_OWN = 0.02
+#: Farthest that a cane sways aside (m), and how near to a place along it a line must come to pass it (m).
+_SWAYS, _PAST = 0.03, 0.005
+
+
+class CloseUp(NamedTuple):
+    """Result of a close-up, and by how much its picture is shifted against the plant map (3, m, odom)."""
+
+    result: CloseUpResult
+    shift: Array
 
 
 @dataclass(frozen=True)
@@ -65,8 +77,11 @@ def check_close_up(
     config: PerceptionConfig,
     known: Surroundings = NOTHING_KNOWN,
     lift: float = 0.0,
-) -> CloseUpResult:
+    expected: Array = UNSHIFTED,
+) -> CloseUp:
     """Check one point in a close-up frame.
+
+    A cane is taken to be off only where no other one passes that may be it, swaying.
 
     Args:
         view: The frame.
@@ -77,31 +92,35 @@ def check_close_up(
         known: Canes and nodes that the map has around the point; without any, the picture counts as not shifted.
         lift: By how much the picture was shifted up or down beforehand (m). Canes tell a shift across, but not along:
             as after any shift, the last kept node has to be seen.
+        expected: Shift of the last picture that showed this cane (3, m, odom).
 
     Raises:
         UnusablePictureError: The image is blank.
         CorruptFrameError: The image is corrupt.
     """
-    limits, position, along = config.close_up, np.array(point.position), np.array(point.tangent)
+    limits, accepted, along = config.close_up, np.array(point.position), np.array(point.tangent)
+    position = accepted + expected
     u, v, z = view.pixels(position)[0]
     height, width = view.depth.shape
 
     def result(
-        finding: Finding, reason: Reason | None = None, cane: _Cane | None = None, shift: float = 0.0
-    ) -> CloseUpResult:
+        finding: Finding, reason: Reason | None = None, cane: _Cane | None = None, moved: float = 0.0
+    ) -> CloseUp:
         confirmed = cane if finding == "seen" else None
-        return CloseUpResult(
+        told = CloseUpResult(
             header=m.Header(view.stamp, "odom"),
             point_id=point.point_id,
             number=number,
             finding=finding,
             reason=reason,
-            position=None if confirmed is None else vector3(confirmed.at(shift)),
+            position=None if confirmed is None else vector3(confirmed.at(moved)),
             tangent=None if confirmed is None else vector3(confirmed.tangent),
             distance=max(0.0, float(z)),
-            nodes=() if cane is None else tuple(float(arc - shift) for arc in cane.nodes),
+            nodes=() if cane is None else tuple(float(arc - moved) for arc in cane.nodes),
         )
+        return CloseUp(told, expected if shift is None else shift.by)
 
+    shift: PictureShift | None = None
     if not limits.min_distance <= z <= limits.max_distance:
         away = reasons.camera_not_at_standoff(float(z), limits.min_distance, limits.max_distance)
         return result("unseen", away)
@@ -111,22 +130,24 @@ def check_close_up(
     part = view.part(slice(round(v) - half, round(v) + half), slice(round(u) - half, round(u) + half))
     labels = segmenter.segment(part)
     lines = trace_canes(part, labels, config.skeleton)
-    shift = picture_shift(known, lines, position, along)
-    moved = lift + (0.0 if shift is None else float(np.linalg.norm(shift.by)))
-    position = position if shift is None else position + shift.by
-    beyond = wood_presence(part, labels, position + limits.probe_distance * along)[0]
+    shift = picture_shift(known, lines, accepted, along, expected)
+    by = expected if shift is None else shift.by
+    moved, position = lift + float(np.linalg.norm(by)), accepted + by
+    probe = position + limits.probe_distance * along
+    beyond = wood_presence(part, labels, probe)[0]
     cane = _cane_at(position, along, lines, limits)
     if cane is None:
         # A renewal cut is on a stub.
         wood = np.where(labels == SPUR, np.uint8(CANE), labels)
         cane = _cane_at(position, along, trace_canes(part, wood, config.skeleton), limits)
+    gone = beyond == "gone" and not _may_stand_aside(probe, along, lines, known, shift, limits)
     if cane is None:
-        if beyond == "gone":
+        if gone:
             return result("severed")
         return result("unseen", reasons.cane_hidden() if beyond == "not visible" else reasons.no_cane_at_place())
     if cane.end < limits.probe_distance:
         # Wood beyond may lack depth alone, as in low sun.
-        if cane.end_reason == "free" and beyond == "gone":
+        if cane.end_reason == "free" and gone:
             return result("severed")
         return result("unseen", reasons.beyond_cut_hidden(), cane)
     if shift is None and cane.distance > limits.sure_offset:
@@ -137,16 +158,48 @@ def check_close_up(
         return result("unseen", reasons.cane_end_unclear(), cane)
     if point.offset is None:
         return result("seen", None, cane)
-    expected = -point.offset
-    kept = [arc for arc in cane.nodes if abs(arc - expected) < limits.max_node_shift]
+    last = -point.offset
+    kept = [arc for arc in cane.nodes if abs(arc - last) < limits.max_node_shift]
     if kept:
-        return result("seen", None, cane, min(kept, key=lambda arc: abs(arc - expected)) - expected)
+        return result("seen", None, cane, min(kept, key=lambda arc: abs(arc - last)) - last)
     crowding = [arc for arc in cane.nodes if abs(arc) < limits.node_clearance]
     if crowding:
         return result("changed", reasons.node_near_cut(1e3 * abs(float(crowding[0]))), cane)
     if moved > limits.sure_offset:
         return result("unseen", reasons.node_unseen_in_shifted_picture(1e3 * moved), cane)
     return result("seen", reasons.node_before_cut_unseen(), cane)
+
+
+def _may_stand_aside(
+    probe: Array,
+    along: Array,
+    lines: list[Centreline],
+    known: Surroundings,
+    shift: PictureShift | None,
+    limits: CloseUpConfig,
+) -> bool:
+    """Whether a line past a place beyond the cut, as far aside as a cane sways, is none of the known neighbours.
+
+    Args:
+        probe: The place, as the picture is shifted (3, m, odom).
+        along: Unit vector along the cane (3, odom).
+        lines: Canes that the picture shows.
+        known: Canes around the point, its own among them.
+        shift: Of the picture; None where nobody knows it, so that any line may be the cane.
+        limits: Which lines count.
+    """
+    axes = () if shift is None else tuple(axis + shift.by for axis in known.axes)
+    neighbours = [axis for axis in axes if float(np.min(np.linalg.norm(axis - probe, axis=1))) > _OWN]
+    for line in lines:
+        away = np.linalg.norm(line.axis - probe, axis=1)
+        k = int(np.argmin(away))
+        chord = line.axis[min(k + 1, len(away) - 1)] - line.axis[max(k - 1, 0)]
+        passes = abs(float((line.axis[k] - probe) @ along)) < _PAST and float(away[k]) < _SWAYS
+        if not passes or abs(float(chord @ along)) < limits.min_alignment * float(np.linalg.norm(chord)):
+            continue
+        if all(float(np.min(np.linalg.norm(axis - line.axis[k], axis=1))) > _OWN / 2 for axis in neighbours):
+            return True
+    return False
 
 
 def failed_check(frame: CameraFrame, reason: Reason) -> CloseUpResult:
@@ -179,6 +232,9 @@ def _cane_at(position: Array, along: Array, lines: list[Centreline], limits: Clo
         if abs(float(tangent @ along)) < limits.min_alignment or (best is not None and best.distance <= offset):
             continue
         nodes = np.array(sorted(sense * (node.arc - fine[foot]) for node in line.nodes))
-        end = float(fine[-1] - fine[foot]) if sense > 0.0 else float(fine[foot])
+        # Where depth was lost up to the end, the line may go on along other wood.
+        begins = next((span.end for span in line.hidden if span.start <= _STEP), 0.0)
+        ends = next((span.start for span in line.hidden if span.end >= fine[-1] - _STEP), float(fine[-1]))
+        end = ends - float(fine[foot]) if sense > 0.0 else float(fine[foot]) - begins
         best = _Cane(position + lateral, sense * tangent, end, line.ends[int(sense > 0.0)], nodes, offset)
     return best

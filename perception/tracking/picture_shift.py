@@ -30,6 +30,10 @@ _AGREED, _CLEARLY = 0.4, 0.25
 _SPACING = 0.002
 
 
+#: Shift of a picture that is where it is taken to be (3, m).
+UNSHIFTED: Array = np.zeros(3)
+
+
 class PictureShift(NamedTuple):
     """Where a point is seen, less where it is in the map (3, m, odom), and whether the nodes agree along the cane."""
 
@@ -37,31 +41,34 @@ class PictureShift(NamedTuple):
     agreed: bool = True
 
 
-def picture_shift(known: Surroundings, lines: list[Centreline], position: Array, along: Array) -> PictureShift | None:
+def picture_shift(
+    known: Surroundings, lines: list[Centreline], position: Array, along: Array, expected: Array = UNSHIFTED
+) -> PictureShift | None:
     """How far a picture is shifted.
 
     Args:
-        known: Canes and nodes around the point; without any, the shift is zero.
+        known: Canes and nodes around the point; without any, the shift is the expected one.
         lines: Canes that the picture shows.
         position: The point (3, m, odom).
         along: Unit vector along its cane (3, odom).
+        expected: Shift of the last picture of the point that told one (3, m, odom).
 
     Returns:
-        The smallest shift that explains the known wood well; None where no shift explains it.
+        Of the shifts that explain the known wood well, the one nearest to the expected one; None without any.
     """
     if not known.axes:
-        return PictureShift(np.zeros(3))
+        return PictureShift(expected)
     if not lines:
         return None
     samples = [interpolate(np.arange(0.0, float(line.arc[-1]), _SPACING), line.arc, line.axis) for line in lines]
     seen, wood = cKDTree(np.concatenate(samples)), np.concatenate(known.axes)
-    shifts = [np.zeros(3)]
+    shifts = [expected]
     shifts += [shift for axis in known.axes for line in samples if (shift := _across(axis, line, position)) is not None]
     shares = np.array([float(np.mean(seen.query(wood + shift)[0] < _THERE)) for shift in shifts])
     if shares.max() < _EXPLAINED:
         return None
     good = [shift for shift, share in zip(shifts, shares, strict=True) if share >= shares.max() - _BETTER]
-    across = min(good, key=lambda shift: float(np.linalg.norm(shift)))
+    across = min(good, key=lambda shift: float(np.linalg.norm(shift - expected)))
     found, nodes = known.nodes + across, _nodes(lines)
     further = _along(found, nodes, along)
     own = found[np.linalg.norm(_aside(found - position - across, along), axis=1) < _THERE]

@@ -12,7 +12,7 @@ _SAME_DEPTH = 0.025
 #: Least depth (m): the camera is blind below 0.18 m (D435i), plus the error of a position.
 _MIN_DEPTH = 0.25
 #: Search radius across the view (m), for errors of odometry.
-_SEARCH_RADIUS = 0.008
+SEARCH_RADIUS = 0.008
 #: A post or trunk so near behind a cane looks like it, and the network takes the cane for a part of it (m).
 _ALIKE_BEHIND = 0.15
 #: Wood farther behind the position than this belongs to another row (m).
@@ -21,20 +21,21 @@ _OTHER_ROW = 0.8
 Presence = Literal["present", "gone", "not visible"]
 
 
-def wood_presence(view: View, labels: Labels, positions: Array) -> list[Presence]:
+def wood_presence(view: View, labels: Labels, positions: Array, aside: float = SEARCH_RADIUS) -> list[Presence]:
     """Presence of spur, cane or node at positions on the axis of the wood (N×3, m, odom).
 
     Args:
         view: The frame.
         labels: H×W class indices.
         positions: To check.
+        aside: How far aside it may be seen (m).
     """
-    return [_at(view, labels, u, v, z) for u, v, z in view.pixels(positions).tolist()]
+    return [_at(view, labels, u, v, z, aside) for u, v, z in view.pixels(positions).tolist()]
 
 
-def _at(view: View, labels: Labels, u: float, v: float, z: float) -> Presence:
+def _at(view: View, labels: Labels, u: float, v: float, z: float, aside: float) -> Presence:
     height, width = view.depth.shape
-    radius = max(2, round(view.intrinsics.fx * _SEARCH_RADIUS / max(z, 0.1)))
+    radius = max(2, round(view.intrinsics.fx * aside / max(z, 0.1)))
     if z < _MIN_DEPTH or not (radius <= u < width - radius - 1 and radius <= v < height - radius - 1):
         return "not visible"
     row, col = round(v), round(u)

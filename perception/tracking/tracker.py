@@ -17,7 +17,7 @@ from perception.config import TrackerConfig
 from perception.plant.numbering import SpurNumber
 from perception.rules.pruning import Cut, cutting_force
 from perception.segmentation.frame import View
-from perception.tracking.presence import wood_presence
+from perception.tracking.presence import SEARCH_RADIUS, wood_presence
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.messages.perception import identity, point_digest
@@ -32,6 +32,8 @@ _SAME_OFFSET = 0.003
 _OFFSETS = 7
 #: Observations farther than this from most others are of another cane, or mix the depths of two (m).
 _SAME_PLACE = 0.008
+#: A cane that sways is seen within so many standard deviations of where it was seen, and at most so far away (m).
+_SWAY, _MOST_SWAY = 2.0, 0.03
 #: Camera positions nearer to each other than this are one viewpoint (m): what hides a cane hides it from all of them.
 _SAME_VIEWPOINT = 0.05
 #: Standard deviation of one observation, used as prior: depth (2.9 mm at 0.9 m, 0.08 px of a D435i) and half a pixel
@@ -103,6 +105,12 @@ class _Track:
         if cut.offset is not None:
             track.offsets.append(cut.offset)
         return track
+
+    @property
+    def sway(self) -> float:
+        """How far aside of its position it may be seen (m), by how far aside it was seen so far."""
+        spread = float(np.linalg.eigvalsh(self.position_scatter)[-1])
+        return min(max(SEARCH_RADIUS, _SWAY * math.sqrt(max(spread, 0.0))), _MOST_SWAY)
 
     @property
     def site(self) -> Site:
@@ -349,7 +357,7 @@ class Tracker:
         `competing` has the hits of the supported track of each site.
         """
         probe = track.position + self._config.probe_distance * track.tangent
-        presence = wood_presence(view, labels, probe)[0]
+        presence = wood_presence(view, labels, probe, track.sway)[0]
         if presence == "not visible":
             return None
         track.gone = track.gone + 1 if presence == "gone" else 0
@@ -451,10 +459,11 @@ def _add_viewpoint(viewpoints: list[Array], position: Array) -> None:
 
 
 def _agreed(positions: Array) -> Array:
-    """Mean of the positions (N×3) near the one that most others are nearest to."""
+    """Mean of the positions (N×3) near the one that most others are nearest to: along the way of a cane that sways."""
     distances = cdist(positions, positions)
-    middle = distances[np.argmin(np.minimum(distances, 2 * _SAME_PLACE).sum(axis=0))]
-    mean: Array = positions[middle < _SAME_PLACE].mean(axis=0)
+    near = max(_SAME_PLACE, float(np.median(distances)))
+    middle = distances[np.argmin(np.minimum(distances, 2 * near).sum(axis=0))]
+    mean: Array = positions[middle < near].mean(axis=0)
     return mean
 
 

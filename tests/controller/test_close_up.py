@@ -1,5 +1,8 @@
 """A picture of a point is asked for until it comes; one that does not show the point is taken once more."""
 
+import numpy as np
+import pytest
+
 from controller.work.close_up import CloseUpClient
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import CloseUpResult, Finding
@@ -98,3 +101,36 @@ def test_a_picture_that_was_taken_for_lost_still_counts_when_it_comes_late() -> 
     client.update(look(request[0]), 5.0)
     answer = client.answer("a", 5.0)
     assert answer is not None and answer.finding == "seen"
+
+
+def seen_at(client: CloseUpClient, *places: float | None) -> float | None:
+    """Pictures of a cane that is expected at 0.5, by where they show it (None: not). Where the answer has it."""
+    client.ask("a", "seen", 0.0, np.array([0.5, 0.75, 1.0]))
+    for tick, x in enumerate(places):
+        assert client.answer("a", 0.1 * tick) is None, f"answered after {tick} pictures"
+        request = client.due(0.1 * tick)
+        assert request is not None
+        finding: Finding = "unseen" if x is None else "seen"
+        position = None if x is None else (x, 0.75, 1.0)
+        found = CloseUpResult(header=m.Header(), point_id="a", number=request[0], finding=finding, position=position)
+        client.update(found, 0.1 * tick)
+    answer = client.answer("a", 1.0)
+    return None if answer is None or answer.position is None else answer.position[0]
+
+
+@pytest.mark.parametrize(
+    ("places", "answer"),
+    [
+        ((0.503,), 0.503),
+        ((0.52, 0.521), 0.5205),
+        ((0.52, None, 0.521), 0.5205),
+        ((0.52, 0.49, 0.51), 0.505),
+        ((0.52, None, None, None), 0.52),
+        ((None, None, 0.52, 0.49), 0.503333),
+        ((None, None, None, None), None),
+    ],
+    ids=["there", "shifted", "hidden once", "swaying", "hidden since", "swaying, hidden first", "never"],
+)
+def test_a_cane_that_is_seen_elsewhere_is_looked_at_again_and_one_that_sways_is_where_it_is_in_the_mean(places, answer):
+    """In the mean of what the pictures show; of one that sways with where it was expected."""
+    assert seen_at(CloseUpClient(8.0, 2, 4), *places) == (answer and pytest.approx(answer, abs=1e-6))

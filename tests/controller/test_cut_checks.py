@@ -130,7 +130,9 @@ def test_a_cane_that_is_seen_beside_the_cut_hangs_and_is_not_cut_again() -> None
 
 
 def test_a_cane_beside_the_cut_that_the_blades_have_not_cut_is_for_a_person_to_look_at() -> None:
+    """After a second bite: where it sways the first one may have closed beside it."""
     work = Work()
+    assert work.cut("FAILED_NOT_CUT", "seen", 0.02) == "ACCEPTED"
     assert work.cut("FAILED_NOT_CUT", "seen", 0.02) == "UNKNOWN"
     assert work.ticket.reason == reasons.beside_but(REPORTS["FAILED_NOT_CUT"], 20.0)
 
@@ -205,14 +207,21 @@ def test_a_point_that_the_close_up_shows_changed_is_not_cut_says_why_and_the_wor
     assert entry(r, "b").state == "DONE"
 
 
+@pytest.mark.parametrize("finding", ["unseen", "severed", "changed"])
 @pytest.mark.parametrize("hidden", [1, 2, 9])
-def test_what_close_ups_do_not_show_is_looked_at_from_other_sides_and_then_left(hidden):
-    """The other cut is made in between. The third side is the last one."""
+def test_what_close_ups_do_not_show_is_looked_at_from_other_sides_and_then_left(hidden, finding):
+    """The other cut is made in between. The third side is the last one. Nobody has cut this one."""
     r = working((point("a", (0.5, 0.75, 1.0)), point("b", (0.8, 0.75, 1.05))))
     usual, sides = r.close_up, []
+    told = {
+        "unseen": "The close-up did not show it",
+        "severed": "Its cane is off already",
+        "changed": "In the close-up",
+    }
+    told = told[finding]
 
     def again():
-        return sum("a: The close-up did not show it" in event for event in r.events)
+        return sum(event.startswith(f"a: {told}") for event in r.events)
 
     def partly(request):
         found = usual(request)
@@ -220,7 +229,7 @@ def test_what_close_ups_do_not_show_is_looked_at_from_other_sides_and_then_left(
             return found
         if len(sides) <= again():
             sides.append(r.model.kinematics(r.q).T_odom_tool.rotation[:, 2])
-        return found if again() >= hidden else msgspec.structs.replace(found, finding="unseen", position=None)
+        return found if again() >= hidden else msgspec.structs.replace(found, finding=finding, position=None)
 
     r.close_up = partly
     finish(r, 90.0)
@@ -240,6 +249,23 @@ def test_the_place_of_the_close_up_is_cut_and_the_log_says_how_far_it_is_from_th
     assert entry(r, "a").state == "DONE"
     assert abs(r.cuts[0][1][0, 3] - 0.5 - dx) < 0.0015
     assert any("a is cut 20 mm from where it was accepted" in event for event in r.events) is told
+
+
+def test_a_cane_that_sways_is_cut_in_the_middle_of_its_way():
+    r = working((point("a", (0.5, 0.75, 1.0)),))
+    usual, swings = r.close_up, iter([0.02, -0.018, 0.014, *[0.0] * 50])
+
+    def swaying(request):
+        found = usual(request)
+        if found.finding != "seen":
+            return found
+        x, y, z = found.position
+        return msgspec.structs.replace(found, position=(x + next(swings), y, z))
+
+    r.close_up = swaying
+    finish(r, 30.0)
+    assert entry(r, "a").state == "DONE"
+    assert abs(r.cuts[0][1][0, 3] - 0.504) < 0.0015
 
 
 def test_the_robot_does_not_go_back_for_a_severed_cane_that_hangs_beside_its_stub():

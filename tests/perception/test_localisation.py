@@ -215,6 +215,22 @@ def test_wood_of_another_row_is_refused_and_the_estimate_stays(seed):
     assert after.covariance[X, X] > 0.05**2
 
 
+def test_close_ups_of_other_wood_do_not_lose_the_robot_and_the_next_sight_of_the_row_does():
+    """In the wind no cane of a close-up may be where it was."""
+    drive = Drive(vines(3), 3)
+    drive.go(0.6)
+    drive.row, before = vines(4), drive.localiser.estimate.T_map_odom
+    for _ in range(8):
+        drive.now, drive.odom = drive.now + 0.5, drive.odom + [0.01, 0.0, 0.0]
+        drive.localiser.predict(drive.odom, drive.now)
+        drive.localiser.update(*sees(drive.row, drive.true, drive.odom, drive.rng), near=True)
+    assert drive.localiser.estimate.state == "located"
+    assert np.linalg.norm(drive.localiser.estimate.T_map_odom.act(EAST) - before.act(EAST)) < 0.02
+    for _ in range(4):
+        drive.go(0.02, step=0.02)
+    assert drive.localiser.estimate.cause == "other wood"
+
+
 def test_the_deviation_grows_with_the_way_and_beyond_a_bound_the_robot_is_lost():
     drive = Drive(vines(6), 6)
     spreads = []

@@ -83,3 +83,13 @@ def test_without_anything_known_there_is_no_shift_and_what_fits_nowhere_has_none
     assert shift_of(NOTHING_KNOWN, seen((0.02, 0.0, 0.0))) == pytest.approx(np.zeros(3))
     assert picture_shift(known(), [], HERE, UP) is None
     assert picture_shift(known(), seen((0.2, 0.0, 0.0)), HERE, UP) is None
+
+
+def test_where_two_shifts_explain_the_wood_as_well_that_of_the_last_picture_counts() -> None:
+    """One of two like canes hides: it may be either."""
+    alone = seen((0.0, 0.0, 0.0), {0.0: ()})
+    there = Surroundings((axis(0.0), axis(0.025)), np.zeros((0, 3)))
+    assert picture_shift(there, alone, HERE, UP).by == pytest.approx(np.zeros(3), abs=1e-3)
+    before = np.array([-0.024, 0.0, 0.0])
+    assert picture_shift(there, alone, HERE, UP, before).by == pytest.approx(before, abs=2e-3)
+    assert picture_shift(NOTHING_KNOWN, alone, HERE, UP, before).by == pytest.approx(before)

@@ -13,13 +13,14 @@ from bridge.sim.camera.frame import survey_frame
 from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
-from perception.config import PerceptionConfig
+from perception.config import CloseUpConfig, PerceptionConfig
 from perception.loop import PerceptionProcess
 from perception.pipeline import Perception, with_width_bias
 from perception.segmentation.frame import CORDON, POST, CorruptFrameError, decode_frame
 from perception.segmentation.segmenter import LabelImageSegmenter, choose_segmenter
 from perception.skeleton.topology import perceive_plant
 from perception.tracking.camera_rays import CameraRays
+from perception.tracking.close_up import check_close_up
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.commands import AddPoint, AddPointInImage, EvaluateRule, LeaveSite, MovePoint, SetRule, UndoRule
@@ -59,6 +60,59 @@ def test_points_show_after_they_were_seen_often_enough_and_keep_their_names(mode
         assert after[point.point_id].revision == point.revision
         assert after[point.point_id].position == point.position
     assert results[3].frames == 4 and results[3].segmenter == "simulator labels" and results[3].canes
+
+
+def test_close_ups_after_the_odometry_has_drifted_leave_points_where_the_map_has_their_canes(
+    model, frames, monkeypatch
+):
+    """As often as one looks: each picture shows a cane by the drift aside, not by one more than the last one."""
+    seen = Perception(PerceptionConfig(close_up=CloseUpConfig(max_distance=1.2)), LabelImageSegmenter(), model)
+    for frame in frames:
+        seen.process(frame)
+    base = frames[0].base
+    drifted = msgspec.structs.replace(frames[0], base=msgspec.structs.replace(base, x=base.x + 0.012))
+    before, aside = {each.point_id: each for each in seen.points().points}, []
+    expected = []
+
+    def check(*arguments):
+        expected.append(arguments[-1])
+        return check_close_up(*arguments)
+
+    monkeypatch.setattr("perception.pipeline.check_close_up", check)
+    for point_id, point in before.items():
+        for number in (1, 2, 3):
+            look = seen.check_close_up(msgspec.structs.replace(drifted, point_id=point_id, number=number))
+            if look.position is None:
+                continue
+            aside.append(look.position[0] - point.position[0])
+            after = next(each for each in seen.points().points if each.point_id == point_id)
+            assert np.linalg.norm(np.subtract(after.position, point.position)) < 0.006
+    assert len(aside) >= 6
+    assert np.median(aside) == pytest.approx(0.012, abs=0.002) and np.ptp(aside) < 0.012
+    assert np.median([each[0] for each in expected if each.any()]) == pytest.approx(0.012, abs=0.003)
+
+
+def test_close_ups_of_wood_that_the_wind_has_moved_do_not_lose_the_place_in_the_row(model, frames):
+    config = PerceptionConfig(localise=True, close_up=CloseUpConfig(max_distance=1.2))
+    seen, camera, other = (
+        Perception(config, LabelImageSegmenter(), model),
+        Camera(CameraConfig(), 1),
+        grow(VineyardConfig(), 2),
+    )
+    for frame in frames:
+        seen.process(frame)
+    point_id, asked = seen.points().points[0].point_id, 0
+    for k in range(4, 14):
+        frame = survey_frame(camera, other, model, k)
+        x, y, phi = frame.base.x + 0.1 * (k - 3), frame.base.y, frame.base.phi
+        frame = msgspec.structs.replace(frame, base=msgspec.structs.replace(frame.base, x=x))
+        seen.row_frame.predict(np.array([x, y, phi]), frame.header.stamp)
+        asked += seen.row_frame.uncertain
+        seen.check_close_up(msgspec.structs.replace(frame, point_id=point_id, number=k))
+    assert asked >= 6 and seen.row_frame.lost is None
+    for k in range(14, 20):
+        seen.process(survey_frame(camera, other, model, k))
+    assert seen.row_frame.lost is not None, "pictures of the row do"
 
 
 def test_the_same_frames_give_the_same_points_and_they_fit_the_wire(model, frames):

@@ -68,6 +68,16 @@ def test_canes_side_by_side_stay_two():
     assert len(spur.canes) == 2 and len(spur.as_spur().canes) == 2
 
 
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_cane_that_sways_is_one_cane_and_never_its_neighbour_which_the_same_frames_show(order):
+    """It comes nearer to where its neighbour was than to where it was itself."""
+    swings = [0.0, 0.012, 0.02, 0.008, 0.02]
+    looks = [plant(*[cane(x=swing, radius=0.004), cane(x=0.03, radius=0.006)][::order]) for swing in swings]
+    (spur,) = known(*looks).spurs
+    assert [one.base.count for one in spur.canes] == [5, 5]
+    assert sorted(one.radius.mean[0] for one in spur.canes) == pytest.approx([0.004, 0.006])
+
+
 def test_a_cane_that_a_third_of_the_looks_have_shown_is_known_to_be_hidden_in_one_without_it_until_it_is_cut():
     map_, both, one = PlantMap(), plant(cane(), cane(x=0.03)), plant(cane())
     told = [map_.update(each, (NUMBER,))[0] for each in (both, one, one, one, both)]

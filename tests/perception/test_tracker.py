@@ -269,6 +269,25 @@ def test_a_standing_cane_keeps_its_point_through_frames_without_proposal():
     assert len(tracker.points()) == 1
 
 
+@pytest.mark.parametrize(
+    ("swings", "stays"), [((0.0, 0.001, -0.001, 0.0), False), (0.015 * np.sin(np.arange(20.0)), True)]
+)
+def test_a_cane_that_sways_is_not_taken_to_be_cut_where_it_is_seen_no_farther_aside_than_before(swings, stays):
+    tracker = Tracker(CONFIG)
+    for swing in swings:
+        feed(tracker, view(), proposal(x=swing))
+    (point,) = tracker.points()
+    assert abs(point.position[0]) < 0.002, "the middle of its way"
+    aside = replace(view(), labels=np.roll(view().labels, 5, axis=1), depth=np.roll(view().depth, 5, axis=1))
+    for _ in range(CONFIG.gone_frames):
+        feed(tracker, aside)
+    assert bool(tracker.points()) is stays
+    if stays:
+        for _ in range(CONFIG.gone_frames):
+            feed(tracker, view(cane=False))
+        assert not tracker.points()
+
+
 def test_a_cut_cane_takes_its_point_away_and_says_so():
     tracker = Tracker(CONFIG)
     for _ in range(4):
