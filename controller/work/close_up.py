@@ -63,17 +63,27 @@ class _Asked:
 
     def sways(self) -> bool:
         """Whether the pictures show the cane at different places, or the only one not where it is expected."""
-        places = [self.place] if len(self.seen) == 1 and self.place is not None else []
-        places += [np.array(each.position) for each in self.seen if each.position is not None]
+        if self.place is None:
+            return False
+        places = [self.place] if len(self.seen) == 1 else []
+        places += [np.array(each.position) for each in self.seen]
         return any(math.dist(one, other) > _STILL for one, other in itertools.combinations(places, 2))
 
-    def mean(self) -> CloseUpResult:
-        """The last picture that showed the cane, with the mean place: where it sways, of the expected one too."""
-        last, sways = self.seen[-1], len(self.seen) > 1 and self.sways()
-        places = [each.position for each in self.seen if each.position is not None]
-        if sways and self.place is not None:
+    def conclusion(self, last: CloseUpResult) -> CloseUpResult:
+        """What all pictures come to; `last` is the newest.
+
+        The cane is at its mean place in them, and where it sways in the expected one too. What one picture alone shows
+        elsewhere may be another cane.
+        """
+        if self.place is None or not self.seen or last.finding not in (self.expected, "unseen"):
+            return last
+        places, sways = [each.position for each in self.seen if each.position is not None], self.sways()
+        if sways and len(places) == 1:
+            aside = reasons.which_cane_unclear(1e3 * math.dist(places[0], self.place))
+            return replace(self.seen[0], finding="unseen", reason=aside, position=None, tangent=None)
+        if sways:
             places.append(vector3(self.place))
-        return replace(last, position=vector3(np.mean(places, axis=0))) if len(places) > 1 else last
+        return replace(self.seen[-1], position=vector3(np.mean(places, axis=0)))
 
 
 class CloseUpClient:
@@ -114,20 +124,16 @@ class CloseUpClient:
         if asked is None or not asked.first <= result.number <= asked.number or asked.answer is not None:
             return
         asked.came += 1
-        as_expected = result.finding == asked.expected
-        if as_expected and result.position is not None:
-            asked.seen.append(result)
-        if as_expected:
-            wait = asked.place is not None and len(asked.seen) < _SWAYING and asked.sways()
-            most = self._blind
+        if result.finding == asked.expected:
+            asked.seen += [result] if result.position is not None else []
+            wait, most = len(asked.seen) < _SWAYING and asked.sways(), self._blind
         else:
             wait, most = True, self._blind if result.finding == "unseen" else self._pictures
         if wait and asked.came < most:
             self._again(asked, now)
             asked.first = asked.number
         else:
-            usable = asked.seen and result.finding in (asked.expected, "unseen")
-            asked.answer, self.took_s = asked.mean() if usable else result, now - asked.since
+            asked.answer, self.took_s = asked.conclusion(result), now - asked.since
 
     def due(self, now: float) -> tuple[int, str] | None:
         """Number and point of the request to send in this period; None when none is due."""

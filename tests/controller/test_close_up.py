@@ -125,11 +125,21 @@ def seen_at(client: CloseUpClient, *places: float | None) -> float | None:
         ((0.52, 0.521), 0.5205),
         ((0.52, None, 0.521), 0.5205),
         ((0.52, 0.49, 0.51), 0.505),
-        ((0.52, None, None, None), 0.52),
+        ((0.52, None, None, None), None),
+        ((None, None, None, 0.52), None),
         ((None, None, 0.52, 0.49), 0.503333),
         ((None, None, None, None), None),
     ],
-    ids=["there", "shifted", "hidden once", "swaying", "hidden since", "swaying, hidden first", "never"],
+    ids=[
+        "there",
+        "shifted",
+        "hidden once",
+        "swaying",
+        "elsewhere in one alone",
+        "elsewhere at last",
+        "swaying, hidden first",
+        "never",
+    ],
 )
 def test_a_cane_that_is_seen_elsewhere_is_looked_at_again_and_one_that_sways_is_where_it_is_in_the_mean(places, answer):
     """In the mean of what the pictures show; of one that sways with where it was expected."""
