@@ -20,6 +20,8 @@ from rolling_panda.model.wire_values import vector3
 
 #: A cane may be seen so far from where it was seen before: in the wind, and as the camera's place errs (m).
 _SAME_CANE = 0.025
+#: A cut is on the cane whose axis is nearer to it than this (m).
+_AT_CUT = 0.015
 #: Part of a cane by which two observations are aligned (m from the base), and how many of its points that takes.
 _NEAR_BASE, _ALIGNED = 0.25, 5
 #: Nodes nearer than this along a cane are one (m).
@@ -313,7 +315,7 @@ class PlantMap:
     def sever(self, position: Array) -> bool:
         """Remove the wood beyond a cut at `position` (3, m, odom); whether a known cane was there."""
         found = self.nearest_cane(position)
-        if found is None or found[2] > _SAME_CANE:
+        if found is None or found[2] > _AT_CUT:
             return False
         _, cane, _, arc = found
         cane.cut_at = min(cane.cut_at, arc)
