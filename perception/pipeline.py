@@ -278,11 +278,8 @@ class Perception:
                 self._locate(view)
             view = self.row_frame.in_map(view)
             known = self.plant_map.around(np.array(point.position), AROUND)
-            lift = self.row_frame.lift(np.array(point.position))
             expected = self._shifts.get(point.point_id, UNSHIFTED)
-            check, shift = check_close_up(
-                view, self.segmenter, point, frame.number, self._config, known, lift, expected
-            )
+            check, shift = check_close_up(view, self.segmenter, point, frame.number, self._config, known, expected)
         except UnusablePictureError as error:
             return failed_check(frame, error.reason)
         self._follower.begin(check, point.kind == "renewal cut")

@@ -2001,11 +2001,6 @@ def which_internode_unclear() -> None:
 
 
 @_reason("info", "")
-def node_unseen_in_shifted_picture(distance_mm: float) -> None:
-    """The picture is shifted by {distance_mm:.0f} mm, and the bud before the cut was not seen."""
-
-
-@_reason("info", "")
 def node_near_cut(distance_mm: float) -> None:
     """A bud is seen {distance_mm:.0f} mm from the cut."""
 

@@ -83,10 +83,6 @@ class RowFrame:
             reason=self.lost,
         )
 
-    def lift(self, place: Array) -> float:
-        """By how much the transform in use lifts or lowers a place (3, m, map), for height and tilt of the base (m)."""
-        return abs(float(self.T_map_odom.actInv(place)[2] - place[2]))
-
     @property
     def uncertain(self) -> bool:
         """Whether the robot has moved so far since it was located that a close-up has to tell where it is."""

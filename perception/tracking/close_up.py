@@ -76,7 +76,6 @@ def check_close_up(
     number: int,
     config: PerceptionConfig,
     known: Surroundings = NOTHING_KNOWN,
-    lift: float = 0.0,
     expected: Array = UNSHIFTED,
 ) -> CloseUp:
     """Check one point in a close-up frame.
@@ -90,8 +89,6 @@ def check_close_up(
         number: Of the request.
         config: Section `[perception]`.
         known: Canes and nodes that the map has around the point; without any, the picture counts as not shifted.
-        lift: By how much the picture was shifted up or down beforehand (m). Canes tell a shift across, but not along:
-            as after any shift, the last kept node has to be seen.
         expected: Shift of the last picture that showed this cane (3, m, odom).
 
     Raises:
@@ -132,7 +129,7 @@ def check_close_up(
     lines = trace_canes(part, labels, config.skeleton)
     shift = picture_shift(known, lines, accepted, along, expected)
     by = expected if shift is None else shift.by
-    moved, position = lift + float(np.linalg.norm(by)), accepted + by
+    position = accepted + by
     probe = position + limits.probe_distance * along
     beyond = wood_presence(part, labels, probe)[0]
     cane = _cane_at(position, along, lines, limits)
@@ -165,9 +162,7 @@ def check_close_up(
     crowding = [arc for arc in cane.nodes if abs(arc) < limits.node_clearance]
     if crowding:
         return result("changed", reasons.node_near_cut(1e3 * abs(float(crowding[0]))), cane)
-    if moved > limits.sure_offset:
-        return result("unseen", reasons.node_unseen_in_shifted_picture(1e3 * moved), cane)
-    return result("seen", reasons.node_before_cut_unseen(), cane)
+    return result("unseen", reasons.node_before_cut_unseen(), cane)
 
 
 def _may_stand_aside(
