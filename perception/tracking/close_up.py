@@ -80,7 +80,8 @@ def check_close_up(
 ) -> CloseUp:
     """Check one point in a close-up frame.
 
-    A cane is taken to be off only where no other one passes that may be it, swaying.
+    A cane is confirmed where the last node that the cut leaves is seen. It is taken to be off only where no other one
+    passes that may be it, swaying.
 
     Args:
         view: The frame.
@@ -88,7 +89,7 @@ def check_close_up(
         point: The published point.
         number: Of the request.
         config: Section `[perception]`.
-        known: Canes and nodes that the map has around the point; without any, the picture counts as not shifted.
+        known: Canes and nodes that the map has around the point; without any, the picture is shifted as expected.
         expected: Shift of the last picture that showed this cane (3, m, odom).
 
     Raises:
