@@ -306,8 +306,7 @@ def not_as_accepted(close_up: CloseUpResult, ticket: Ticket | None) -> Reason | 
 def undecided(close_up: CloseUpResult) -> bool:
     """Whether pictures came and do not tell, so that those from another side may.
 
-    That a cane is off which nobody has cut, or has other nodes than before, is told wrongly as well: where it sways, or
-    where pictures lack depth.
+    A cane that sways, or that lacks depth, may seem severed or changed though it is neither.
     """
     if close_up.finding in ("severed", "changed"):
         return True

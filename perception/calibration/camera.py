@@ -102,7 +102,7 @@ class CameraCalibration:
     def follow(self, offsets: JointOffsets, delay: float = 0.0) -> bool:
         """Take in the calibrations that the bridge uses; returns whether one has changed.
 
-        Then what was seen before is off.
+        Wood that was seen with the earlier ones is then misplaced.
 
         A camera that was measured together with these offsets is offered from now on; nothing else that was measured
         before fits.

@@ -213,12 +213,7 @@ def test_what_close_ups_do_not_show_is_looked_at_from_other_sides_and_then_left(
     """The other cut is made in between. The third side is the last one. Nobody has cut this one."""
     r = working((point("a", (0.5, 0.75, 1.0)), point("b", (0.8, 0.75, 1.05))))
     usual, sides = r.close_up, []
-    told = {
-        "unseen": "The close-up did not show it",
-        "severed": "Its cane is off already",
-        "changed": "In the close-up",
-    }
-    told = told[finding]
+    told = {"unseen": "The close-up did not", "severed": "Its cane is off", "changed": "In the close-up"}[finding]
 
     def again():
         return sum(event.startswith(f"a: {told}") for event in r.events)

@@ -195,7 +195,7 @@ def test_a_cane_whose_depth_is_lost_beyond_the_cut_is_not_taken_for_one_that_is_
         depth = view.depth.copy()
         depth[rows, columns] = 0.0
         seen = look(replace(view, depth=depth), point(cut))
-        # Nor for one that stands: what has no depth there may be other wood.
+        # Nor is it confirmed: the wood without depth may be another cane.
         assert z > 0.0 and seen.finding == "unseen" and seen.reason.code in ("beyond_cut_hidden", "no_cane_at_place"), (
             seen
         )
