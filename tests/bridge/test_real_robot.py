@@ -74,7 +74,7 @@ def test_an_emergency_stop_is_latched_and_its_release_waits_for_the_button(rig: 
     plant.base.tell("press")
     assert rig.until(lambda: rig.state.stop_id != "", FORWARD)
     rig.run(0.5, FORWARD)
-    assert rig.at_rest()
+    assert rig.comes_to_rest(FORWARD)
     assert reasons.emergency_stop(reasons.button_pressed()) in log(rig)
     assert not release(rig).ok
     plant.base.tell("free")
@@ -91,7 +91,7 @@ def test_a_reflex_is_told_in_the_arms_words_and_recovered_from_by_a_persons_word
     recoveries = plant.arm.tell("collide")["recoveries"]
     assert rig.until(lambda: rig.state.stop_id != "", FORWARD)
     rig.run(0.6, FORWARD)
-    assert rig.at_rest(), "the base went on without the arm"
+    assert rig.comes_to_rest(FORWARD), "the base went on without the arm"
     assert "joint_reflex" in text_of(rig.state.stopped_by)
     assert plant.arm.tell()["recoveries"] == recoveries
     assert release(rig).ok
@@ -104,7 +104,7 @@ def test_a_base_that_tells_nothing_stops_everything_without_a_latch(rig: Rig, pl
     rig.drive_on()
     plant.base.tell(f"mute {mp500.WHEELS}")
     rig.run(0.9, FORWARD)
-    assert rig.at_rest()
+    assert rig.comes_to_rest(FORWARD)
     assert rig.state.watchdog
     assert reasons.robot_faulty(SILENT) in log(rig)
     plant.base.tell("free")

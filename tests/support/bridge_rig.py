@@ -117,7 +117,7 @@ class Rig(Commander):
             if self.parts.real:
                 time.sleep(0.004)
 
-    def until(self, condition: Callable[[], bool], xi: tuple[float, ...], limit_s: float = 5.0) -> bool:
+    def until(self, condition: Callable[[], bool], xi: tuple[float, ...] | None, limit_s: float = 5.0) -> bool:
         """Run until the condition holds; False when it has not within the limit.
 
         A busy machine may leave a real robot's bridge without a command for longer than its deadline. Then it wants one
@@ -127,6 +127,10 @@ class Rig(Commander):
         while not condition() and self.time.now < end:
             self.run(0.02, REST if self.state.watchdog else xi)
         return condition()
+
+    def comes_to_rest(self, xi: tuple[float, ...] | None) -> bool:
+        """Whether base and arm are at rest now; processes of a real robot's devices may come late to it."""
+        return self.until(self.at_rest, xi, 3.0 if self.parts.real else 0.0)
 
     def drive_on(self) -> None:
         """Come to a steady velocity of base and arm, and see it in the plant."""

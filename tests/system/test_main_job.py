@@ -82,8 +82,11 @@ class Press:
         return pressed
 
 
-def stop_in_mid_approach(page: Page, robot: LiveRobot, stop: Press) -> float:
-    """Start, press stop while the base drives; seconds from the press until base and arm are still, from the trace."""
+def stop_in_mid_approach(page: Page, robot: LiveRobot, stop: Press) -> float | None:
+    """Start, press stop while the base drives; seconds from the press until base and arm are still, from the trace.
+
+    None where the base had arrived before the press: the browser's mouse may come late to it.
+    """
     start(page, robot, robot.driving, "the base to drive")
     pressed = stop.press()
     page.wait_for_selector('#mode[data-mode="ESTOP_LATCHED"]', timeout=20_000)
@@ -91,8 +94,7 @@ def stop_in_mid_approach(page: Page, robot: LiveRobot, stop: Press) -> float:
     page.wait_for_timeout(1500)
     record = trace.read(robot.trace)
     last = record.rows[record.rows["clock"] <= pressed][-1]
-    assert abs(last["base_velocity"][0]) > 0.02, "the base no longer drove when the button was pressed"
-    return record.stopping_time(pressed)
+    return record.stopping_time(pressed) if abs(last["base_velocity"][0]) > 0.02 else None
 
 
 def reset_and_arm(page: Page, robot: LiveRobot) -> None:
@@ -118,9 +120,14 @@ def test_accepted_points_are_cut_where_they_were_accepted_and_the_page_stops_the
             stop = Press(page, "#stop")
             stop.listen()
             took: list[float] = []
+            too_late = 0
             # Two on the same side of the limit settle the median.
             while len(took) < 2 or (len(took) < 3 and min(took) < 0.5 <= max(took)):
-                took.append(stop_in_mid_approach(page, robot, stop))
+                if (seconds := stop_in_mid_approach(page, robot, stop)) is not None:
+                    took.append(seconds)
+                else:
+                    too_late += 1
+                    assert too_late < 3, "the base no longer drove when the button was pressed"
                 reset_and_arm(page, robot)
             start(page, robot, lambda: ended(robot, chosen), "the points to end")
             entries = {row["entry"]["point_id"]: row["entry"] for row in robot.points()}
