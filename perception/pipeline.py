@@ -204,6 +204,8 @@ class Perception:
             return self._process_unfamiliar(self.row_frame.in_map(view), labels, self.row_frame.lost)
         else:
             # Too near or too far to read whole spurs, but it may show that wood is gone.
+            if self.row_frame.uncertain:
+                self._locate(view, labels)
             view = self.row_frame.in_map(view)
             cylinders = self._obstacle_map.update(view, labels)
             self._apply(self._tracker.update(view, labels, []))
@@ -275,7 +277,7 @@ class Perception:
         self.row_frame.predict(_base(frame), view.stamp, _inertial(frame))
         try:
             if self.row_frame.uncertain:
-                self._locate(view)
+                self._locate(view, self.segmenter.segment(view))
             view = self.row_frame.in_map(view)
             known = self.plant_map.around(np.array(point.position), AROUND)
             expected = self._shifts.get(point.point_id, UNSHIFTED)
@@ -308,9 +310,8 @@ class Perception:
             return unseen(view.stamp, point_id, frame.number, error.reason)
         return self.row_frame.sight_in_odom(sight)
 
-    def _locate(self, view: View) -> None:
-        """Find where the robot is from a close-up frame: the base has moved since it was known."""
-        labels = self.segmenter.segment(view)
+    def _locate(self, view: View, labels: Labels) -> None:
+        """Find where the robot is from a frame that is no survey: the base has moved since it was known."""
         lines = trace_canes(view, labels, self._config.skeleton, measured_only=True)
         self.row_frame.update(view, labels, lines, near=True)
 

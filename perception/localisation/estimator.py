@@ -26,8 +26,9 @@ Cause = Literal["", "time ran back", "odometry jumped", "other wood", "too far w
 #: Indices of the state: position, rotation about the axes of the map.
 X, Y, Z, RX, RY, RZ = range(6)
 
-#: Error of a wheel's way, as a share of it: slip and wear (SD), correlated over a length (m). Half the track (m).
-_SLIP, _CORRELATED, _HALF_TRACK = 0.035, 0.5, 0.28
+#: Errors of the base's way, as a share of it, and of its heading without a gyroscope (rad/m): slip and wear of the
+#: wheels (SD), correlated over a length (m). Half the track (m).
+_SLIP, _VEERS, _CORRELATED, _HALF_TRACK = 0.042, 0.088, 0.5, 0.28
 #: Height (m) and tilt (rad) of the base on uneven ground (SD), and the way over which they change (m).
 _HEIGHT, _TILT, _UNEVEN = 0.008, 0.015, 0.4
 #: Where inertial sensors tell how the base stands: by how much height (m), tilt and heading (rad) are off after a metre
@@ -48,6 +49,8 @@ _ROBUST = 2.0
 _ON, _KNOWN = 0.012, 0.05
 #: Share of samples at known wood that have to be on it, and least number of bodies that tell the place.
 _EXPLAINED, _BODIES = 0.6, 3
+#: The same for a frame from near, which shows laterals and leaves that the map has not: with few bodies, and with more.
+_EXPLAINED_NEAR, _MORE_BODIES, _EXPLAINED_MORE = 0.5, 5, 0.35
 #: Spacing of places along the row from which the comparison starts where the prediction is worse than this (m), and
 #: how many standard deviations they reach.
 _START, _STARTS = 0.02, 2.5
@@ -210,7 +213,7 @@ class RowLocaliser:
             return self.estimate
         if self._state == "lost" and (fit.explained < _FOUND or fit.bodies < _FOUND_BODIES):
             return self.estimate
-        if fit.explained < _EXPLAINED or not self._correct(fit):
+        if not _recognised(fit, near) or not self._correct(fit):
             if near:
                 return self.estimate
             self._others += 1
@@ -225,7 +228,7 @@ class RowLocaliser:
             self._at_rest += 1
         T = self.estimate.T_map_odom
         eye = T.act(camera)
-        if self._state == "located" and self._map.distance(eye) > _KEEP:
+        if self._state == "located" and not near and self._map.distance(eye) > _KEEP:
             self._map.add(seen.moved(T.rotation, T.translation), eye)
         return self.estimate
 
@@ -245,6 +248,11 @@ class RowLocaliser:
         out: Array = np.diag(_LASTING**2)
         out[[X, Y], [X, Y]] += (_DELAY * self._speed) ** 2
         return out
+
+    @property
+    def moved(self) -> bool:
+        """Whether the base has moved since frames told its place as well as they can."""
+        return self._at_rest < _AT_REST
 
     @property
     def spread(self) -> float:
@@ -275,11 +283,11 @@ class RowLocaliser:
         P = F @ self._covariance @ F.T
         before = self._since_fix
         self._since_fix += rolled
-        grown = _SLIP**2 * (_walked(before + rolled) - _walked(before))
+        walked = _walked(before + rolled) - _walked(before)
         heading = self._pose[RZ] + turned / 2
         along = np.array([np.cos(heading), np.sin(heading)])
-        P[:2, :2] += grown / 2 * np.outer(along, along) + 0.02 * grown * np.eye(2)
-        P[RZ, RZ] += _GYROSCOPE**2 * rolled if inertial else grown / (2 * _HALF_TRACK**2)
+        P[:2, :2] += _SLIP**2 * walked * (np.outer(along, along) + 0.04 * np.eye(2))
+        P[RZ, RZ] += _GYROSCOPE**2 * rolled if inertial else _VEERS**2 * walked
         for index, spread, measured in (
             (Z, _HEIGHT, _MEASURED_HEIGHT),
             (RX, _TILT, _MEASURED_TILT),
@@ -382,6 +390,13 @@ class RowLocaliser:
         short = np.maximum(0.5 * np.diag(common) - np.diag(P), 0.0) if fit.bodies else np.zeros(6)
         self._covariance = (P + P.T) / 2 + np.diag(short)
         return True
+
+
+def _recognised(fit: _Fit, near: bool) -> bool:
+    """Whether enough of the known wood is where the fit has it; of a frame from near."""
+    if not near or fit.bodies < _BODIES:
+        return fit.explained >= _EXPLAINED
+    return fit.explained >= (_EXPLAINED_MORE if fit.bodies >= _MORE_BODIES else _EXPLAINED_NEAR)
 
 
 def _at_wood(correction: Array) -> float:

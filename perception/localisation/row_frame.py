@@ -28,8 +28,8 @@ from rolling_panda.model.wire_values import vector3
 _DEPARTS, _FOLLOWS = 0.006, 0.0015
 #: The wood in view: so far before the camera, and so far to either side (m).
 _AHEAD, _ASIDE = 0.8, 0.4
-#: A place in the map that is known worse than this is looked for in a close-up too (m, SD).
-_UNCERTAIN = 0.006
+#: A place in the map that is known worse than this is looked for in pictures from near too (m, SD).
+_UNCERTAIN = 0.004
 
 _CAUSES: dict[Cause, Callable[[], m.Reason]] = {
     "time ran back": reasons.lost_by_clock,
@@ -85,8 +85,8 @@ class RowFrame:
 
     @property
     def uncertain(self) -> bool:
-        """Whether the robot has moved so far since it was located that a close-up has to tell where it is."""
-        return self._on and self._localiser.spread > _UNCERTAIN
+        """Whether the base has moved since it was located, so far that pictures from near have to tell where it is."""
+        return self._on and self._localiser.moved and self._localiser.spread > _UNCERTAIN
 
     def forget(self) -> None:
         """Forget the wood, which another calibration sees elsewhere; what is known of the place stays."""

