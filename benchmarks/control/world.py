@@ -176,7 +176,9 @@ def main(argv: Sequence[str]) -> int:
     parser.add_argument("--seed", type=_count, default=2000, help="first seed (default: %(default)s)")
     parser.add_argument("--count", type=_count, default=20, help="rows in each world (default: %(default)s)")
     parser.add_argument("--points", type=_count, default=4, help="most points accepted in a row (default: 4)")
-    parser.add_argument("--pictures", type=float, default=0.7, help="pictures a second in motion (default: 0.7)")
+    parser.add_argument(
+        "--pictures", type=float, default=2.0, help="pictures a second in motion (default: %(default)s, as in the demo)"
+    )
     parser.add_argument("--check-camera", action="store_true", help="check the camera first, and use the correction")
     parser.add_argument(
         "--calibrated",

@@ -29,8 +29,8 @@ _REPEAT_S = 0.05
 _LOST_S = 1.5
 #: A cane that pictures show within this of each other, or of where it is expected, does not sway (m).
 _STILL = 0.005
-#: So many pictures of a cane that sways tell where it is in the mean.
-_SWAYING = 3
+#: So many pictures of a cane that sways tell where it is in the mean, taken so far apart (s): it sways at 0.5 to 2 Hz.
+_SWAYING, _APART_S = 3, 0.3
 
 
 @dataclass
@@ -130,7 +130,7 @@ class CloseUpClient:
         else:
             wait, most = True, self._blind if result.finding == "unseen" else self._pictures
         if wait and asked.came < most:
-            self._again(asked, now)
+            self._again(asked, now + (_APART_S if asked.sways() else 0.0))
             asked.first = asked.number
         else:
             asked.answer, self.took_s = asked.conclusion(result), now - asked.since
@@ -167,9 +167,9 @@ class CloseUpClient:
             )
         return asked.answer
 
-    def _again(self, asked: _Asked, now: float) -> None:
+    def _again(self, asked: _Asked, at: float) -> None:
         self._number += 1
-        asked.number, asked.since, asked.sent_at = self._number, now, -math.inf
+        asked.number, asked.since, asked.sent_at = self._number, at, at - _REPEAT_S
 
 
 #: Time limit for the request of a close-up after a cut (s); after it the cutter's report counts.

@@ -107,14 +107,14 @@ def seen_at(client: CloseUpClient, *places: float | None) -> float | None:
     """Pictures of a cane that is expected at 0.5, by where they show it (None: not). Where the answer has it."""
     client.ask("a", "seen", 0.0, np.array([0.5, 0.75, 1.0]))
     for tick, x in enumerate(places):
-        assert client.answer("a", 0.1 * tick) is None, f"answered after {tick} pictures"
-        request = client.due(0.1 * tick)
+        assert client.answer("a", 0.4 * tick) is None, f"answered after {tick} pictures"
+        request = client.due(0.4 * tick)
         assert request is not None
         finding: Finding = "unseen" if x is None else "seen"
         position = None if x is None else (x, 0.75, 1.0)
         found = CloseUpResult(header=m.Header(), point_id="a", number=request[0], finding=finding, position=position)
-        client.update(found, 0.1 * tick)
-    answer = client.answer("a", 1.0)
+        client.update(found, 0.4 * tick)
+    answer = client.answer("a", 2.0)
     return None if answer is None or answer.position is None else answer.position[0]
 
 
@@ -144,3 +144,18 @@ def seen_at(client: CloseUpClient, *places: float | None) -> float | None:
 def test_a_cane_that_is_seen_elsewhere_is_looked_at_again_and_one_that_sways_is_where_it_is_in_the_mean(places, answer):
     """In the mean of what the pictures show; of one that sways with where it was expected."""
     assert seen_at(CloseUpClient(8.0, 2, 4), *places) == (answer and pytest.approx(answer, abs=1e-6))
+
+
+@pytest.mark.parametrize(("x", "apart"), [(0.52, 0.3), (0.503, None), (None, 0.0)], ids=["swaying", "there", "unseen"])
+def test_pictures_of_a_cane_that_may_sway_are_apart_in_time(x, apart):
+    client = CloseUpClient(8.0, 2, 4)
+    client.ask("a", "seen", 0.0, np.array([0.5, 0.75, 1.0]))
+    request = client.due(0.0)
+    assert request is not None
+    position = None if x is None else (x, 0.75, 1.0)
+    finding: Finding = "unseen" if x is None else "seen"
+    client.update(
+        CloseUpResult(header=m.Header(), point_id="a", number=request[0], finding=finding, position=position), 1.0
+    )
+    due = [now for now in (1.0, 1.1, 1.29, 1.31, 1.5) if client.due(now) is not None]
+    assert (due[0] if due else None) == (None if apart is None else pytest.approx(1.0 + apart, abs=0.02))
