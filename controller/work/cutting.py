@@ -647,7 +647,9 @@ class Travel(MovingStage):
             timeout.again()
             return CloseUp(parts, self._task, self._way), result
         if not (config.work.pre_cut_check and timeout.over(tracking, now, 0.0)) and timeout.late(now):
-            return self._fail(robot, self.point_id, missed("the stand-off", tracking))
+            why = missed("the stand-off", tracking)
+            # What holds it back would do so again. Without that it is the base, on wheels that have slipped.
+            return self._fail(robot, self.point_id, why) if tracking.reason else self._another_time(robot, why)
         return self, result
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from controller.motion.follower import MotionTimeout, Tracking, missed
+from controller.work import cutting
 from rolling_panda import reasons
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.reasons import text_of
@@ -96,5 +97,18 @@ def test_a_cut_that_was_not_reached_is_tried_another_way():
     r.obstacles = (Capsule("wire", (-0.2, 0.75, 1.2), (2.0, 0.75, 1.2), 0.004, 0.004),)
     run_until(r, lambda s: entry(r, "a").reason is not None, 20.0)
     assert entry(r, "a").state == "ACCEPTED" and entry(r, "a").reason.code == "missed_once"
+    finish(r, 60.0)
+    assert entry(r, "a").state == "DONE" and len(r.cuts) == 1
+
+
+def test_a_camera_place_that_the_base_does_not_come_to_is_left_and_the_cut_tried_again(monkeypatch):
+    """Wheels that have slipped leave the base elsewhere, with the tool where it should be."""
+    ready, tries = cutting.camera_ready, []
+    monkeypatch.setattr(cutting, "camera_ready", lambda *given: len(tries) > 0 and ready(*given))
+    r = working((point("a", (0.3, 0.785, 1.169)),))
+    run_until(r, lambda s: s is not None and s.phase == "APPROACH", 10.0)
+    run_until(r, lambda s: entry(r, "a").reason is not None, 30.0)
+    assert entry(r, "a").state == "ACCEPTED" and entry(r, "a").reason.code == "missed_once"
+    tries.append(1)
     finish(r, 60.0)
     assert entry(r, "a").state == "DONE" and len(r.cuts) == 1
