@@ -28,7 +28,7 @@ X, Y, Z, RX, RY, RZ = range(6)
 
 #: Errors of the base's way, as a share of it, and of its heading without a gyroscope (rad/m): slip and wear of the
 #: wheels (SD), correlated over a length (m). Half the track (m).
-_SLIP, _VEERS, _CORRELATED, _HALF_TRACK = 0.042, 0.088, 0.5, 0.28
+_SLIP, _VEERS, _CORRELATED, _HALF_TRACK = 0.035, 0.088, 0.5, 0.28
 #: Height (m) and tilt (rad) of the base on uneven ground (SD), and the way over which they change (m).
 _HEIGHT, _TILT, _UNEVEN = 0.008, 0.015, 0.4
 #: Where inertial sensors tell how the base stands: by how much height (m), tilt and heading (rad) are off after a metre

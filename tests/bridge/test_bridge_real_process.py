@@ -93,7 +93,7 @@ def test_it_follows_the_wire_or_only_tells_the_robots_state(site: Site, readonly
             wheels, dq = site.base.tell()["wheels"], site.arm.tell()["dq"]
             return np.allclose(wheels, FORWARD[:2], atol=0.1) and np.allclose(dq, FORWARD[2:], atol=0.02)
 
-        for xi, seconds in ((REST, 0.5), (FORWARD, 1.5 if readonly else 10.0)):
+        for xi, seconds in ((REST, 0.5), (FORWARD, 1.5 if readonly else 5.0)):
             end = time.monotonic() + seconds
             while time.monotonic() < end and not (xi is FORWARD and not readonly and drives()):
                 got, told = joints.take(), state.peek()
