@@ -5,12 +5,13 @@ VENV := .venv
 BIN := $(VENV)/bin
 TYPESCRIPT := typescript@5.9.3
 
-.PHONY: help demo test test-peers test-training fast coverage check format docs bench mutation clean lock materials browser systemd drivers training peers
+.PHONY: help demo test test-long test-peers test-training fast coverage check format docs bench mutation clean lock materials browser systemd drivers training peers
 .DEFAULT_GOAL := help
 
 help:
 	@echo "make demo    start everything in simulation; prints a link to sign in with   (ARGS='--port 8001 --seed 3')"
-	@echo "make test    make check, then every test"
+	@echo "make test    make check, then the tests that take seconds at most"
+	@echo "make test-long  the tests that take longer"
 	@echo "make test-peers  the tests with others' controllers and planners"
 	@echo "make test-training  the tests of the training, with PyTorch"
 	@echo "make fast    quick tests: no browser, no processes, none that computes for seconds"
@@ -38,21 +39,25 @@ demo: $(VENV)/.project
 
 # First the tests that others may run beside, one more at once than there are cores, since a browser's test waits as much as
 # it computes; then those that keep real time, two at once; then those that anything beside them would disturb. Training
-# and others' controllers have their own targets, since nothing else needs their packages.
+# and others' controllers have their own targets, since nothing else needs their packages. $(call stages,WHICH): all three.
 PEER_TESTS := tests/benchmarks/test_peers.py
 TRAINING_TESTS := tests/perception/test_training.py tests/perception/test_wide_training.py tests/perception/test_tune.py \
 	tests/perception/test_familiarity.py tests/perception/test_int8.py \
 	tests/benchmarks/test_familiarity_scores.py
 WITHOUT_EXTRAS := $(PEER_TESTS:%=--ignore %) $(TRAINING_TESTS:%=--ignore %)
+stages = $(BIN)/pytest -n $$(($$(nproc) + 1)) --dist worksteal -m "$(1) and not (paced or alone or slow)" $(WITHOUT_EXTRAS) && \
+	$(BIN)/pytest -n 2 --dist loadfile -m "paced and $(1) and not (alone or slow)" $(WITHOUT_EXTRAS) && \
+	$(BIN)/pytest -m "alone and $(1) and not slow" $(WITHOUT_EXTRAS)
 test: check browser systemd drivers
 ifdef ARGS
 	$(BIN)/pytest $(ARGS)
 else
-	$(BIN)/pytest -n $$(($$(nproc) + 1)) --dist worksteal -m "not (paced or alone or slow)" $(WITHOUT_EXTRAS)
-	$(BIN)/pytest -n 2 --dist loadfile -m "paced and not (alone or slow)" $(WITHOUT_EXTRAS)
-	$(BIN)/pytest -m "alone and not slow" $(WITHOUT_EXTRAS)
-	@echo "make test-training runs the tests of the training; it installs PyTorch"
+	$(call stages,not long)
+	@echo "make test-long runs the tests that take longer, make test-training those of the training; it installs PyTorch"
 endif
+
+test-long: browser systemd drivers
+	$(call stages,long)
 
 test-peers: peers
 	$(BIN)/pytest $(PEER_TESTS)

@@ -16,6 +16,7 @@ POST = Obstacle("post", "post", (0.55, 0.0, 0.0), (0.55, 0.0, 2.0), 0.05)
 LEFT, RIGHT = np.array([1.0, 0.6, 0.0, -1.5, 0.0, 2.1, 0.8]), np.array([-1.0, 0.6, 0.0, -1.5, 0.0, 2.1, 0.8])
 
 
+@pytest.mark.long
 def test_a_task_begins_and_ends_clear_of_what_stays_and_stands():
     (first, *others) = approach.tasks(4200, LIMITS)
     assert others
@@ -39,6 +40,7 @@ def test_a_way_that_is_too_near_is_seen_though_its_ends_are_clear(monkeypatch):
     assert approach.summarise([judged])["too_near"] == 1
 
 
+@pytest.mark.long
 def test_the_command_prints_each_planner_and_writes_every_way(tmp_path, capsys):
     path = tmp_path / "approach.json"
     assert main(["approach", "--seed", "4200", "--count", "1", "--most", "3", "--json", str(path)]) == 0

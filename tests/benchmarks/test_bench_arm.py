@@ -24,6 +24,7 @@ def test_pairs_repeat_are_inside_the_limits_and_clear():
     assert not np.array_equal(pairs[0].start, pairs[1].start)
 
 
+@pytest.mark.long
 def test_the_arm_alone_reaches_and_ends_with_more_manipulability_than_it_has_to(tmp_path, capsys):
     path = tmp_path / "arm.json"
     assert arm.main(["--count", "12", "--seed", "3", "--jobs", "1", "--json", str(path)]) == 0

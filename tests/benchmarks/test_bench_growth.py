@@ -2,9 +2,12 @@
 
 import json
 
+import pytest
+
 from benchmarks.__main__ import main
 
 
+@pytest.mark.long
 def test_each_vine_passed_is_a_line_and_what_is_known_grows_with_them(tmp_path, capsys):
     out = tmp_path / "growth.json"
     words = [

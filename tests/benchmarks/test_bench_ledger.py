@@ -9,6 +9,7 @@ from benchmarks.__main__ import main
 pytestmark = pytest.mark.processes
 
 
+@pytest.mark.long
 def test_it_measures_three_kinds_of_disk(tmp_path):
     file = tmp_path / "ledger.json"
     assert main(["ledger", "--seconds", "1.0", "--json", str(file)]) == 0

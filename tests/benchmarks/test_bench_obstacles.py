@@ -45,6 +45,7 @@ def trunk(bottom, top, radius):
     return Capsule("trunk", bottom, top, radius, radius)
 
 
+@pytest.mark.long
 def test_a_trunk_as_it_is_is_right_and_what_is_in_view_without_an_obstacle_is_missing():
     row, verdict = judged()
     true = next(rod for _, rod in row.standing() if rod.kind == "trunk" and rod.start[2] > 0.7)
@@ -53,6 +54,7 @@ def test_a_trunk_as_it_is_is_right_and_what_is_in_view_without_an_obstacle_is_mi
     assert verdict.seen["trunk"] > 0.1 and verdict.missing == pytest.approx(verdict.seen)
 
 
+@pytest.mark.long
 def test_a_trunk_that_leans_is_too_thick_or_far_behind_is_told_as_that():
     y = VineyardConfig().row_distance
     leaning = trunk((0.5, y, 0.6), (0.7, y, 0.8), 0.03)
@@ -63,6 +65,7 @@ def test_a_trunk_that_leans_is_too_thick_or_far_behind_is_told_as_that():
     assert third.p95 > 0.4
 
 
+@pytest.mark.long
 def test_the_command_writes_what_it_measured(tmp_path, capsys):
     out = tmp_path / "out.json"
     words = ["--seeds", "0", "--minutes", "0.3", "--pictures", "6", "--segmenter", "labels", "--json", str(out)]

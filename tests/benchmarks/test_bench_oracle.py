@@ -60,6 +60,7 @@ def test_blades_slant_to_pass_a_cane_that_stays_beside_a_cut_between_nodes(searc
     assert plan is not None and 0.26 < abs(plan.approach[2]) <= 0.55
 
 
+@pytest.mark.long
 def test_the_command_tells_shares_and_reasons_and_writes_every_cut(tmp_path, capsys):
     path = tmp_path / "oracle.json"
     assert main(["oracle", "--seed", "7900", "--count", "1", "--json", str(path)]) == 0

@@ -130,6 +130,7 @@ def test_a_step_that_leads_nowhere_is_refused(capsys):
     assert "more than 0 m" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_the_command_writes_what_it_measured(tmp_path, capsys):
     path = tmp_path / "p.json"
     words = ["--seed", "100", "--vines", "1", "--segmenter", "labels"]
@@ -167,6 +168,7 @@ def test_wrong_points_are_pictured(tmp_path, monkeypatch):
         assert colors[1] < 15 < colors[0]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [3, 101])
 def test_points_of_a_rendered_row_are_where_a_grower_would_cut(seed):
     survey, model = Survey(), RobotModel()

@@ -123,6 +123,7 @@ def test_standing_still_away_from_the_goal_is_not_reaching():
     assert at_home.reached and at_home.omega_mean == pytest.approx(0.095, abs=0.002)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("free_axis", ["none", "tool_y"])
 def test_goals_anywhere_are_reached_without_breaking_a_limit(free_axis, tmp_path):
     rows = reach.run(reach_targets.draw(21, 12, free_axis), "hierarchy", 0, 1, tmp_path)
@@ -161,6 +162,7 @@ def test_driving_first_takes_longer_and_a_straight_screw_reaches_less():
     assert straight < len(together)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("goals", ["anywhere", "row"])
 def test_no_motion_is_quicker_than_its_lower_bound(goals):
     rows = reach.run(reach_targets.draw(22, 6, "none", goals=goals), "hierarchy", 0, 1)
@@ -210,6 +212,7 @@ def test_a_peer_that_is_not_installed_is_refused_with_how_to_get_it(monkeypatch,
     assert "pip install --no-deps crocoddyl" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_methods_are_judged_beside_each_other_on_the_same_goals(tmp_path, capsys):
     path = tmp_path / "reach.json"
     words = ["--count", "2", "--seed", "41", "--goals", "row", "--jobs", "1", "--json", str(path)]
@@ -226,6 +229,7 @@ def test_methods_are_judged_beside_each_other_on_the_same_goals(tmp_path, capsys
     assert table[0].startswith("hierarchy") and table[1].startswith("holistic")
 
 
+@pytest.mark.long
 def test_the_command_prints_a_table_and_writes_every_figure(tmp_path, capsys):
     path = tmp_path / "folder" / "reach.json"
     assert reach.main(["--count", "2", "--seed", "21", "--jobs", "2", "--json", str(path)]) == 0

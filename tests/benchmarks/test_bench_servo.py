@@ -22,7 +22,6 @@ def test_the_same_cane_stands_in_every_world_and_only_wind_moves_it() -> None:
     assert not (wind.cane(0.0) == wind.cane(0.7)).all()
 
 
-@pytest.mark.long
 def test_without_disturbance_the_blades_close_around_the_middle_with_and_without_pictures() -> None:
     for servo in (False, True):
         made = close_blades(3300, WORLDS["calm"], servo)

@@ -77,6 +77,7 @@ def test_minutes_of_work_for_a_stop_are_told_beside_the_times_a_person_came() ->
     assert "one in" not in bench.told_stops(bench.work_of([run(cut())]))
 
 
+@pytest.mark.long
 def test_what_was_run_is_on_disk_and_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     worlds: list[tuple[int, WorldConfig]] = []
     offsets: list[float] = []

@@ -8,6 +8,7 @@ import pytest
 from benchmarks.faults.clean import EndlessRow, main, work
 
 
+@pytest.mark.long
 def test_work_goes_on_without_a_stop_and_with_jitter_on_the_ways(tmp_path, monkeypatch, capsys):
     # Calm and rough seconds in turns, so that a short run has both.
     monkeypatch.setattr("benchmarks.faults.clean._CALM_S", 2.0)
@@ -18,6 +19,7 @@ def test_work_goes_on_without_a_stop_and_with_jitter_on_the_ways(tmp_path, monke
     assert "0 stops" in capsys.readouterr().out
 
 
+@pytest.mark.long
 def test_in_jitter_the_blades_are_asked_to_close_when_the_arm_rests():
     world = EndlessRow(0)
     world.motion.jitter = world.state.jitter = world.odometry.jitter = 0.1

@@ -52,6 +52,7 @@ def test_nothing_moves_before_start_and_then_the_cane_is_severed_where_it_was_ac
     assert min(math.dist(piece["point"], entry.accepted_position) for piece in cut["severed"]) < 0.010
 
 
+@pytest.mark.long
 def test_the_stop_halts_a_moving_robot_and_only_a_reset_with_a_start_moves_it_again(tmp_path: Path) -> None:
     loop = surveyed(2, tmp_path / "trace")
     accept(loop, 2)
@@ -76,6 +77,7 @@ def test_the_stop_halts_a_moving_robot_and_only_a_reset_with_a_start_moves_it_ag
     assert record.stopping_time(pressed) < 0.5
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [5])
 def test_the_same_seed_gives_the_same_trace(tmp_path: Path, seed: int) -> None:
     digests = []

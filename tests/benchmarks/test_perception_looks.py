@@ -1,6 +1,7 @@
 """The ablation of second looks: what they refine, what they void, and what is seen after a cut."""
 
 import numpy as np
+import pytest
 
 from benchmarks.perception.judge import RowJudge
 from benchmarks.perception.looks import CloseCamera, Looks, look_again, summarise_looks
@@ -23,6 +24,7 @@ def point(number, cut, aside=0.0):
     return pruning_point(f"p{number}", place, vector3(cut.tangent), vine=1, spur=number, offset=0.02)
 
 
+@pytest.mark.long
 def test_a_second_look_brings_points_nearer_to_their_canes_and_voids_what_is_on_none():
     row = grow(VineyardConfig(vines=1), SEED)
     cuts = [truth.cut for truth in judge(row) if truth.cut is not None][:3]

@@ -39,6 +39,7 @@ def test_a_picture_is_of_the_part_that_matters_in_few_colours(page: Page, tmp_pa
         assert len(part.convert("RGB").getcolors() or ()) in range(16, pictures.COLOURS + 1)
 
 
+@pytest.mark.long
 def test_a_small_sign_keeps_its_colour_beside_a_large_picture() -> None:
     rng = np.random.default_rng(0)
     picture = Image.fromarray(rng.integers(0, 256, (400, 600, 3), dtype=np.uint8))
@@ -69,6 +70,7 @@ def test_without_the_tests_it_says_what_is_missing(tmp_path: Path, monkeypatch: 
         pictures.played(pytest.fail, pictures.Album(tmp_path), ())
 
 
+@pytest.mark.long
 @pytest.mark.browser
 @pytest.mark.alone
 def test_ended_while_its_demo_starts_it_leaves_nothing_behind(tmp_path: Path) -> None:

@@ -45,6 +45,7 @@ def test_every_second_has_one_stage_and_the_blades_take_theirs():
     assert sum(clock.limits.values()) == pytest.approx(under_way, abs=1e-6)
 
 
+@pytest.mark.long
 def test_the_limit_that_binds_is_named():
     free, _ = work(ControllerConfig())
     slow_joints, _ = work(controller_config(whole_body__arm_velocity_scale=0.3))

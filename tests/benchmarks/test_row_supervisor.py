@@ -59,6 +59,7 @@ def test_work_without_a_stop_needs_nobody(record):
     assert person.cleared == 0 and person.waited_s == 0.0
 
 
+@pytest.mark.long
 def test_after_a_stop_a_person_looks_and_what_stops_the_robot_again_and_again_it_gives_up(record):
     loop, person = Beside(pushed=("a",)), Supervisor(record)
     assert loop.work(person) == {"a": "FAILED_NOT_CUT", "b": "DONE"}
@@ -73,6 +74,7 @@ def test_a_row_that_stops_again_and_again_is_given_up(record, monkeypatch):
     assert person.cleared == 1 and loop.controller.mode == "PROTECTIVE_STOP"
 
 
+@pytest.mark.long
 def test_a_person_says_by_the_truth_how_a_cut_of_unknown_outcome_ended(record):
     loop, person = Beside(outcome="UNKNOWN"), Supervisor(record)
     assert loop.work(person) == {"a": "FAILED_NOT_CUT", "b": "DONE"}

@@ -35,6 +35,7 @@ class Beside(KinematicLoop):
                 self.robot.show(tuple(point(name, (x, 0.76, 1.05)) for name, x in self._seen.items()))
 
 
+@pytest.mark.long
 def test_what_comes_into_view_on_the_way_is_cut_and_gaps_are_driven_over():
     # The third comes into view while the second is cut, the last only after a gap that is driven over by hand.
     row = {"a": 0.4, "b": 0.7, "c": 1.0, "d": 2.1}

@@ -12,6 +12,7 @@ from benchmarks.peers.problem import write_problem
 from controller.config import ControllerConfig
 
 
+@pytest.mark.long
 def test_tick_writes_the_figures_it_prints(tmp_path, capsys):
     file = tmp_path / "tick.json"
     assert main(["tick", "--steps", "150", "--json", str(file)]) == 0

@@ -27,8 +27,6 @@ from rolling_panda.resources import resource
 from tests.support.bridge_rig import FORWARD, MODEL, REST, NoCamera, Parts, Rig, SimulatedPlant
 from tests.support.extras import need
 
-pytestmark = pytest.mark.long
-
 
 def simulated() -> Parts:
     config = replace(load_section(resource("assets/config/sim.toml"), "bridge", BridgeConfig), inertial=True)
@@ -125,6 +123,7 @@ def test_calibrated_wheels_turn_as_the_ground_needs_and_the_odometry_tells_the_w
     assert rig.plant.breaches() == []
 
 
+@pytest.mark.long
 def test_calibrated_joints_are_told_as_drawn_and_end_at_their_own_limits(rig: Rig) -> None:
     rig.run(0.3, REST)
     off = 0.03

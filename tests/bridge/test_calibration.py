@@ -140,6 +140,7 @@ def true_wheels(errors):
     )
 
 
+@pytest.mark.long
 def test_a_robot_with_other_wheels_goes_where_its_odometry_says_once_it_is_calibrated():
     world, seed = replace(CALM, wheel_error=0.03), 6
     config = load_section(resource("assets/config/sim.toml"), "bridge", BridgeConfig)

@@ -55,6 +55,7 @@ def last_on_a_core(pid: int) -> Iterator[None]:
     os.sched_setaffinity(pid, cores)
 
 
+@pytest.mark.long
 @pytest.mark.alone  # It takes a whole core from everybody.
 def test_a_client_that_waits_for_a_core_has_lost_nothing(box: DeviceProcess) -> None:
     with running(CLIENT, ADDRESS) as client:

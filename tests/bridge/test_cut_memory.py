@@ -216,7 +216,6 @@ for number in range(max(0, first - 3), 10**9):
 """
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("kills", [20, pytest.param(1000, marks=pytest.mark.slow)])
 def test_no_cut_is_made_twice_when_the_bridge_is_killed(tmp_path: Path, kills: int) -> None:
     blades, reached, chance = tmp_path / "blades", 0, random.Random(11)

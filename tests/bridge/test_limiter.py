@@ -15,7 +15,6 @@ def limiter() -> Limiter:
     return Limiter(LIMITS, 13.5, 0.01, DT)
 
 
-@pytest.mark.long
 @settings(max_examples=25, deadline=None)
 @given(
     st.lists(st.lists(st.floats(-1e6, 1e6), min_size=9, max_size=9), min_size=1, max_size=6),

@@ -113,6 +113,7 @@ def test_it_follows_with_its_payload_set_and_holds_when_no_target_comes(arm: Pan
     assert box.tell()["breaches"] == []
 
 
+@pytest.mark.long
 def test_random_targets_break_no_limit(arm: Panda, box: DeviceProcess) -> None:
     rng = random.Random(4)
     with Hand(arm, box, REST) as hand:

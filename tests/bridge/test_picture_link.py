@@ -91,7 +91,6 @@ def test_depth_noise_grows_with_the_square_of_the_distance(distance):
     assert np.std(depth) == pytest.approx(sigma, rel=0.02)
 
 
-@pytest.mark.long
 def test_depth_is_in_whole_units_and_within_range():
     T = np.diag([1.0, -1.0, -1.0, 1.0])
     for distance, seen in ((0.15, False), (0.25, True), (3.5, True), (4.5, False)):

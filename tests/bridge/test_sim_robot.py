@@ -46,6 +46,7 @@ def test_odometry_from_the_wheels_stays_with_the_true_base(v: float, omega: floa
     assert abs(true[2] - pose[2]) < np.radians(0.02 + 0.2 * turn / (np.pi / 2))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [1, 2])
 def test_inertial_sensors_keep_the_heading_where_wheels_slip_and_tell_how_the_base_stands(seed: int) -> None:
     config = msgspec.structs.replace(CONFIG, inertial=True)

@@ -329,6 +329,7 @@ def test_a_severed_cane_that_hangs_stays_beside_where_it_stood_and_the_stub_ends
     assert fallen.row.rods[1] is None and len(fallen.row.rods) == 2
 
 
+@pytest.mark.long
 def test_the_same_seed_gives_the_same_bytes_in_a_storm_and_another_seed_others(tmp_path: Path) -> None:
     text = resource("assets/config/sim.toml").read_text().replace("width = 848", "width = 64")
     config = written(tmp_path, text.replace("height = 480", "height = 48").replace('"calm"', '"storm"'))

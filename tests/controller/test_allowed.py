@@ -197,6 +197,7 @@ def in_state(*steps):
     return world.robot.state.allowed
 
 
+@pytest.mark.long
 def test_what_only_the_work_knows_is_told():
     empty = in_state()
     assert empty["RequestPreview"] == reasons.none_accepted()

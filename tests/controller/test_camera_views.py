@@ -1,6 +1,7 @@
 """The arm looks at the calibration's board from all around: the base stands still, each picture is taken at rest."""
 
 import numpy as np
+import pytest
 from msgspec.structs import replace
 
 from rolling_panda import commands as intents
@@ -36,6 +37,7 @@ def taken_at_rest(pictures):
     return list(dict.fromkeys(name for name, _, _ in pictures)), np.array([q[ARM_Q] for _, q, _ in pictures])
 
 
+@pytest.mark.long
 def test_it_takes_pictures_at_rest_from_many_directions_and_comes_home_and_leaves_out_those_among_obstacles():
     r, pictures = calibrating()
     run_until(r, lambda s: s is not None and s.mode == "AUTO", r.now + 1.0)
@@ -52,6 +54,7 @@ def test_it_takes_pictures_at_rest_from_many_directions_and_comes_home_and_leave
     assert len({name for name, _, _ in fewer}) < len(names)
 
 
+@pytest.mark.long
 def test_for_its_joints_the_arm_swings_its_elbow_too_and_looks_at_the_board_as_well():
     r, pictures = calibrating(command=intents.CalibrateArm)
     finish(r, 240.0)
@@ -69,6 +72,7 @@ def test_for_its_joints_the_arm_swings_its_elbow_too_and_looks_at_the_board_as_w
     assert np.abs(r.q[ARM_Q] - CONFIG.work.home).max() < 0.02 and not r.cuts
 
 
+@pytest.mark.long
 def test_a_board_that_is_nowhere_is_told():
     r, _ = calibrating(finding="unseen")
     finish(r, 300.0)

@@ -28,14 +28,12 @@ def run(folder, code):
     return done.stdout.split()
 
 
-@pytest.mark.long
 def test_machine_code_is_kept_for_the_next_start(tmp_path):
     code = "import doubling; print(doubling.twice(2.0), sum(doubling.twice.stats.cache_hits.values()))"
     assert run(tmp_path, code) == ["4.0", "0"]
     assert run(tmp_path, code) == ["4.0", "1"]
 
 
-@pytest.mark.long
 def test_without_a_place_to_keep_it_every_start_compiles(tmp_path):
     # A file where the folder would be keeps everybody out, root too.
     (tmp_path / "__pycache__").write_text("")

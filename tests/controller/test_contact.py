@@ -414,6 +414,7 @@ def turn(one, other):
     return float(np.linalg.norm(pin.log3(one.T @ other)))
 
 
+@pytest.mark.long
 def test_a_cut_that_a_cane_is_in_the_way_of_is_made_after_the_others_from_elsewhere():
     pushed = Pushed(28.0, "ADVANCE")
     r = pushed.run(lambda s: s is not None and any(e.state == "DONE" for e in s.queue))
@@ -515,6 +516,7 @@ def test_a_cane_that_goes_on_pushing_stops_it_for_a_person():
     assert entry(r, "b").state == "ACCEPTED"
 
 
+@pytest.mark.long
 def test_canes_that_push_again_and_again_stop_it_for_a_person():
     r = Pushed(28.0, "ADVANCE", count=4, most=4).run(ended)
     assert r.state.mode == "PROTECTIVE_STOP"

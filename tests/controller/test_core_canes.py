@@ -18,8 +18,6 @@ from tests.support.controller_at_work import entry, robot, run_until, working
 from tests.support.points import point
 from tests.support.sent import newest
 
-pytestmark = pytest.mark.long
-
 CUT = (0.45, 0.75, 1.10)
 STAND_OFF = ControllerConfig().work.stand_off
 
@@ -68,6 +66,7 @@ def test_the_blades_go_to_the_spur_that_is_cut_and_nothing_else_goes_near_any():
     assert all(distance > 0.004 for (_, number), distance in judge.least.items() if number > 0)
 
 
+@pytest.mark.long
 def test_a_cane_before_the_cut_is_gone_around():
     before = cane(CUT[0], y=0.66, spur=2, top=1.30)
     free, _ = work(OWN)

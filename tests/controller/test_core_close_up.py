@@ -14,8 +14,6 @@ from tests.support.points import point
 from tests.support.previewed import Previewed
 from tests.support.worlds.kinematic_robot import KinematicRobot
 
-pytestmark = pytest.mark.long
-
 CUT = (0.45, 0.75, 1.10)
 CLEAR = CUT[1] - CONFIG.work.clearance
 

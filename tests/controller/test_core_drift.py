@@ -17,8 +17,6 @@ from tests.support.fake_wire import located
 from tests.support.points import point
 from tests.support.worlds.kinematic_robot import KinematicRobot
 
-pytestmark = pytest.mark.long
-
 #: Beyond the reach of where the robot stands, so that it drives there.
 CUT = (1.2, 0.75, 1.1)
 CANE = Capsule("cane", (1.2, 0.75, 0.95), (1.2, 0.75, 1.09), 0.004, 0.004, 1, 1)

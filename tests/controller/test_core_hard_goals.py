@@ -23,8 +23,6 @@ from tests.controller.test_core_work import (
     working,
 )
 
-pytestmark = pytest.mark.long
-
 MODEL = RobotModel()
 COLLISION = CollisionModel(MODEL)
 
@@ -108,6 +106,7 @@ def test_a_post_in_between_is_not_met_and_the_tool_comes_back() -> None:
     assert recovers(r, start) > 0.0
 
 
+@pytest.mark.long
 def test_work_behind_a_post_ends_with_a_reason_and_the_rest_is_done() -> None:
     # The post stands beside the robot's path, where the tool passes between cuts.
     r = working((point("here", (0.2, 0.75, 1.05)), point("beyond", (1.5, 0.75, 1.05))))

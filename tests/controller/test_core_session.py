@@ -16,8 +16,6 @@ from rolling_panda.reasons import text_of
 from tests.controller.test_core_work import CONFIG, entry, finish, point, robot
 from tests.support.sent import every
 
-pytestmark = pytest.mark.long
-
 PLANNER = CutPlanner(CONFIG, RobotConfig())
 POST = Capsule("post", (0.5, 0.75, 0.0), (0.5, 0.75, 2.0), 0.05, 0.05)
 
@@ -108,6 +106,7 @@ def test_points_accepted_one_after_the_other_are_planned_once_and_a_late_one_aga
     assert again.plan_hash != first.plan_hash
 
 
+@pytest.mark.long
 def test_work_follows_the_plan_to_its_stands_and_in_its_order() -> None:
     # The nearest is not the first along the row: from the start it costs less to go forward and come back.
     p = Planned(tuple(point(n, (x, 0.75, 1.05)) for n, x in (("back", -0.5), ("near", 0.2), ("mid", 0.5))))
@@ -151,6 +150,7 @@ def test_a_point_that_the_plan_refuses_is_not_driven_to_and_the_ticket_says_why(
     assert p.robot.now < 15.0, "no time is spent on the refused one"
 
 
+@pytest.mark.long
 def test_the_work_does_not_end_before_a_plan_from_the_last_cut_has_refused_what_is_left_too() -> None:
     p = Planned((point("in", (0.5, 0.75, 1.05)), point("good", (1.4, 0.75, 1.05))), obstacles=(POST,))
     p.accepted("in", "good").until_valid()

@@ -51,7 +51,6 @@ def assert_limits_kept(r):
     assert speed.max() <= 0.3 + 1e-6
 
 
-@pytest.mark.long
 def test_random_points_before_the_row_are_reached_and_cut_within_the_limits():
     shown = points(20, seed=3)
     r = working(shown)

@@ -110,6 +110,7 @@ def test_a_start_outside_a_joint_limit_is_planned_from() -> None:
     assert plan.cuts[0].rollout.joint_margin < 0.0 < plan.cuts[0].cut.joint_margin
 
 
+@pytest.mark.long
 def test_the_same_request_has_the_same_hash_whoever_answers_it() -> None:
     asked = request(point("a", 0.3), point("b", 1.1), obstacles=(POST,))
     first = PLANNER.plan(asked)

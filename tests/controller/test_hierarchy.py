@@ -120,7 +120,6 @@ def test_the_tool_is_rarely_slowed_there():
     assert np.mean(np.array(scales) > 1.0 - 1e-9) > 0.8
 
 
-@pytest.mark.long
 @settings(max_examples=40)
 @given(seeds)
 def test_whatever_is_asked_from_wherever_no_limit_is_broken(seed):

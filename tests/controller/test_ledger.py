@@ -430,7 +430,6 @@ def killed_while_writing(folder: Path, after: int) -> int:
     return said
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("kills", [20, pytest.param(500, marks=pytest.mark.slow)])
 def test_no_acknowledged_row_is_lost_when_the_writer_is_killed(tmp_path: Path, kills: int) -> None:
     chance = random.Random(5)

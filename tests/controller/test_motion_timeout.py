@@ -101,6 +101,7 @@ def test_a_cut_that_was_not_reached_is_tried_another_way():
     assert entry(r, "a").state == "DONE" and len(r.cuts) == 1
 
 
+@pytest.mark.long
 def test_a_camera_place_that_the_base_does_not_come_to_is_left_and_the_cut_tried_again(monkeypatch):
     """Wheels that have slipped leave the base elsewhere, with the tool where it should be."""
     ready, tries = cutting.camera_ready, []

@@ -163,6 +163,7 @@ def test_the_plan_says_at_once_what_a_turn_means():
     assert turned.digest != straight.digest
 
 
+@pytest.mark.long
 def test_the_plan_puts_a_cut_that_was_tried_last_and_comes_from_elsewhere():
     q = np.zeros(12)
     q[ARM_Q] = CONFIG.work.home

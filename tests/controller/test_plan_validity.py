@@ -90,6 +90,7 @@ def test_of_new_canes_only_those_beside_the_tools_line_into_a_cut_void_it() -> N
     assert obstacles_changed(known, (WIRE, cane(x + 0.09, y + 0.02))) is None, "noise moves it by less than that"
 
 
+@pytest.mark.long
 def test_a_thicker_one_voids_it_and_a_thinner_one_does_not() -> None:
     thick = Capsule("wire", WIRE.start, WIRE.end, 0.08, 0.08)
     assert obstacles_changed(planned(WIRE), (thick,)) is not None

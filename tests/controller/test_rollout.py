@@ -19,8 +19,6 @@ from tests.support.controller_at_work import CONFIG, entry
 from tests.support.points import point
 from tests.support.previewed import ROLLOUT, Previewed
 
-pytestmark = pytest.mark.long
-
 POINTS = (point("a", (0.45, 0.75, 1.05)), point("b", (0.75, 0.75, 1.1), (0.1, 0.0, 0.995)))
 DRIVE = RobotModel(RobotConfig()).drive
 START = np.zeros(12)
@@ -32,6 +30,7 @@ def no_planner(monkeypatch):
     monkeypatch.setattr(preview_module, "_PLAN_S", 0.0)
 
 
+@pytest.mark.long
 def test_what_is_done_is_what_was_shown():
     """On a robot that is half as late again as the preview reckons with."""
     p = Previewed(POINTS, lag=1.5 * CONFIG.motion.arm_lag_s)
@@ -63,6 +62,7 @@ def test_each_cut_says_when_and_how_near():
     assert times[0] == 0.0 and np.diff(times).max() <= 0.1 + 1e-9
 
 
+@pytest.mark.long
 def test_one_request_has_one_hash_and_another_one_has_another():
     one = ROLLOUT.roll(PreviewRequest(1, START, POINTS[:1]))
     assert Rollout(CONFIG, RobotConfig()).roll(PreviewRequest(2, START, POINTS[:1])).digest == one.digest
@@ -71,6 +71,7 @@ def test_one_request_has_one_hash_and_another_one_has_another():
     assert ROLLOUT.roll(PreviewRequest(3, moved, POINTS[:1])).digest != one.digest
 
 
+@pytest.mark.long
 def test_what_cannot_be_reached_is_shown_as_not_cut_with_the_reason():
     made = ROLLOUT.roll(PreviewRequest(1, START, (point("high", (0.5, 0.75, 2.6)), POINTS[1])))
     assert made.cuts[0].cut_s is None

@@ -19,8 +19,6 @@ from tests.support.controller_config import controller_config
 from tests.support.points import point
 from tests.support.worlds.kinematic_robot import KinematicRobot
 
-pytestmark = pytest.mark.long
-
 PLACE = np.array([0.4, 0.75, 1.0])
 SHOWN = (point("a", vector3(PLACE)),)
 SERVO: ControllerConfig = controller_config(CONFIG, work__servo=True)
@@ -124,6 +122,7 @@ def test_switched_off_it_asks_for_no_picture_and_cuts_where_the_close_up_was(mon
     assert r.asked == [] and np.linalg.norm(blades(r)) < EXACT
 
 
+@pytest.mark.long
 def test_a_swinging_cane_is_nearer_to_the_middle_of_the_blades_when_they_close(monkeypatch) -> None:
     without = controller_config(CONFIG, work__servo=False)
     off: dict[bool, list[float]] = {True: [], False: []}

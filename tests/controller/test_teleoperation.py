@@ -235,6 +235,7 @@ def test_the_base_is_driven_with_the_arm_still():
     assert 0.15 < r.q[2] < 0.31
 
 
+@pytest.mark.long
 def test_the_base_moves_under_a_tool_that_stays():
     r = robot()
     start = tool(r)

@@ -11,7 +11,6 @@ def fast():
     return DrivenBase(1000.0, 50.0, knows="truth").run()
 
 
-@pytest.mark.long
 def test_the_base_is_told_something_new_only_in_its_own_periods(fast):
     changed = np.any(np.diff([xi[:2] for xi in fast.record], axis=0) != 0.0, axis=1)
     at = np.flatnonzero(changed) + 1

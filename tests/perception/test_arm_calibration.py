@@ -64,6 +64,7 @@ def seen(postures=POSTURES, off=OFF, noise=0.08, seed=1, base=None, camera=None)
     return views
 
 
+@pytest.mark.long
 def test_offsets_of_joints_2_to_6_are_found_and_those_of_1_and_7_left_at_zero():
     for seed in (1, 2, 3):
         found = calibrate(seen(seed=seed), RobotModel())
@@ -79,6 +80,7 @@ def refused(views):
     return error.value.reason.code
 
 
+@pytest.mark.long
 def test_what_does_not_tell_the_joints_is_refused_with_the_reason():
     assert refused(seen(POSTURES[:9])) == "calibration_few_views"
     assert refused(seen(base=lambda number: (0.001 * number, 0.0, 0.0))) == "calibration_base_moved"

@@ -20,8 +20,6 @@ from perception.segmentation.segmenter import choose_segmenter
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.model.robot import RobotModel
 
-pytestmark = pytest.mark.long
-
 #: So many of the same frame show a point where the frame is good.
 AGAIN = 4
 REFUSED = (
@@ -84,6 +82,7 @@ def bad(good: CameraFrame, what: str) -> CameraFrame:
     return msgspec.structs.replace(good, **changes[what])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["network", "labels"])
 def test_the_same_frame_makes_points_where_it_is_good(model: RobotModel, good: CameraFrame, name: str) -> None:
     seen = perception(model, name)
@@ -128,6 +127,7 @@ def test_a_closer_look_at_the_good_frame_sees_points(shown: Perception, good: Ca
     assert [look.finding for look in looks].count("seen") >= 2
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("what", (*REFUSED, *WRONG_DEPTH))
 def test_a_closer_look_at_what_shows_nothing_neither_places_a_point_nor_calls_it_cut(
     shown: Perception, good: CameraFrame, what: str

@@ -68,6 +68,7 @@ def errors(fit, true=WORN):
     return np.array([radius, sizes.right / sizes.left - true.right / true.left, sizes.track / true.track - 1.0])
 
 
+@pytest.mark.long
 def test_wheels_are_found_whatever_the_camera_is_mounted_like_and_the_ground_is_like():
     misplaced = pin.SE3(pin.exp3(np.array([0.01, -0.008, 0.006])), np.array([0.006, -0.004, 0.005]))
     for seed, camera in ((1, MOUNTED), (2, misplaced)):
@@ -77,6 +78,7 @@ def test_wheels_are_found_whatever_the_camera_is_mounted_like_and_the_ground_is_
         assert np.abs(off).max() < 0.003 and fit.slip < 0.003 and fit.views == 33
 
 
+@pytest.mark.long
 def test_a_second_calibration_begins_with_the_wheels_of_the_first():
     fit = measure_wheels(driven(legs(), used=WORN), WORN, DRAWN)
     assert np.abs(errors(fit)).max() < 0.003
@@ -88,6 +90,7 @@ def refused(views, used=DRAWN):
     return error.value.reason.code
 
 
+@pytest.mark.long
 def test_what_does_not_tell_the_wheels_is_refused_with_the_reason():
     straight = [(0.25, 0.0), (-0.5, 0.0), (0.25, 0.0)] * 5
     turns = [(0.0, -0.4), (0.0, 0.6), (0.0, -0.2)] * 5
@@ -100,6 +103,7 @@ def test_what_does_not_tell_the_wheels_is_refused_with_the_reason():
     assert refused(driven(legs(), true=small)) == "base_implausible"
 
 
+@pytest.mark.long
 def test_a_clock_that_jumps_and_a_board_that_moves_are_refused():
     views = driven(legs())
     late, early = list(views), list(views)

@@ -48,6 +48,7 @@ def calibration(kept=None, mount=None):
     return CameraCalibration(RobotModel(), mount, keep, clock=lambda: 1.8e9)
 
 
+@pytest.mark.long
 def test_the_camera_is_found_where_it_is_and_used_when_an_operator_says_so(pictures):
     kept = []
     camera = calibration(kept)
@@ -70,6 +71,7 @@ def test_the_camera_is_found_where_it_is_and_used_when_an_operator_says_so(pictu
     assert not camera.use(offer.made_at).ok
 
 
+@pytest.mark.long
 def test_too_few_pictures_give_no_offer_and_a_new_round_begins_anew(pictures):
     camera = calibration()
     for frame in pictures[:5]:
@@ -90,6 +92,7 @@ def test_without_a_board_nothing_is_seen_and_the_old_calibration_stays():
     assert not refused.ok and refused.reason.code == "no_calibration_offered"
 
 
+@pytest.mark.long
 def test_a_calibration_that_cannot_be_kept_is_not_used(pictures):
     def full(mount):
         raise OSError(28, "No space left on device")
@@ -102,6 +105,7 @@ def test_a_calibration_that_cannot_be_kept_is_not_used(pictures):
     assert camera.state.mount is None and camera.state.offer is not None
 
 
+@pytest.mark.long
 def test_a_camera_far_from_where_it_is_drawn_is_not_offered():
     camera = calibration()
     for frame in photographed(replace(CALM, hand_eye_angle=0.2), board=True):
@@ -132,6 +136,7 @@ def test_a_turned_camera_is_told_from_the_row_alone_and_its_correction_takes_the
     assert not points & {point.point_id for point in seeing.points().points}, "no name is used twice"
 
 
+@pytest.mark.long
 def test_an_old_calibration_is_told(pictures):
     camera = calibration()
     for frame in pictures:

@@ -28,8 +28,6 @@ from rolling_panda.model.wire_values import vector3
 from tests.support.cameras import BASE, MODEL, POSTURE, T_TOOL_CAMERA
 from tests.support.points import point as pruning_point
 
-pytestmark = pytest.mark.long
-
 SEED = 210
 SEES = LabelImageSegmenter()
 
@@ -150,6 +148,7 @@ def test_a_cane_beside_the_place_is_not_taken_for_it_where_nothing_around_agrees
     assert beside.finding == "unseen" and beside.reason.code == "which_cane_unclear" and beside.position is None
 
 
+@pytest.mark.long
 def test_where_the_nodes_do_not_tell_which_internode_is_which_it_abstains(scene: Scene, monkeypatch) -> None:
     unsure = PictureShift(np.zeros(3), agreed=False)
     monkeypatch.setattr("perception.tracking.close_up.picture_shift", lambda *_: unsure)
@@ -160,6 +159,7 @@ def test_where_the_nodes_do_not_tell_which_internode_is_which_it_abstains(scene:
     assert "severed" in gone, "that the wood is off needs no internode"
 
 
+@pytest.mark.long
 def test_after_the_cut_it_says_that_the_wood_beyond_is_off_and_before_never(scene: Scene) -> None:
     findings = [look(view_from_clear(without(scene.row, cut), cut), point(cut)).finding for cut in scene.cuts]
     assert findings.count("severed") >= 0.8 * len(findings)
@@ -167,6 +167,7 @@ def test_after_the_cut_it_says_that_the_wood_beyond_is_off_and_before_never(scen
     assert all(look(view, point(cut)).finding == "seen" for cut, view in scene.pairs())
 
 
+@pytest.mark.long
 def test_a_cane_that_sways_aside_is_not_taken_for_one_that_is_cut(scene: Scene) -> None:
     """It is farther aside than any cane is looked for, while its neighbours stand."""
     findings = []

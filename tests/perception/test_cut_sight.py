@@ -23,8 +23,6 @@ from rolling_panda.messages.perception import CloseUpResult, CutSight
 from rolling_panda.model.wire_values import vector3
 from tests.support.cameras import BASE, MODEL, POSTURE, T_TOOL_CAMERA
 
-pytestmark = pytest.mark.long
-
 SEED = 210
 CONFIG = PerceptionConfig()
 ROW = grow(VineyardConfig(vines=1), SEED)
@@ -73,6 +71,7 @@ def off(sight: CutSight, cut: RightCut) -> float:
     return float(np.linalg.norm(apart - cut.tangent * (apart @ cut.tangent)))
 
 
+@pytest.mark.long
 def test_a_cane_that_has_moved_aside_is_found_all_the_way_and_its_error_is_as_told() -> None:
     found, errors = 0, []
     for cut in CUTS:

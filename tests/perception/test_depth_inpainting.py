@@ -32,6 +32,7 @@ def frame(config: CameraConfig) -> View:
     return View(0, 0.0, camera.intrinsics, image.depth, image.labels, b"", place[:3, :3], place[:3, 3])
 
 
+@pytest.mark.long
 def test_canes_get_back_the_depth_that_bled_and_keep_the_rest():
     exact = frame(CameraConfig().ideal())
     bled = frame(msgspec.structs.replace(CameraConfig().ideal(), edge_bleed=0.4))

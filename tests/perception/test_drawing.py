@@ -36,6 +36,7 @@ def upright(column, metres, radius=4.0):
     return [column, 5.0, metres, radius, 0.01, column, 35.0, metres, radius, 0.01]
 
 
+@pytest.mark.long
 def test_a_cone_covers_what_is_within_its_radius_and_stands_out_by_it():
     depth, index, across, along = drawn([upright(20, 1.0)])
     assert np.flatnonzero(index[20] == 0).tolist() == list(range(16, 25))
@@ -106,6 +107,7 @@ def test_a_class_lies_where_its_curve_is_projected_and_the_nearer_curve_hides_th
     assert (on_its_side.kind[50] != BACKGROUND).sum() > 90 and on_its_side.kind[10, 40] != on_its_side.kind[10, 50]
 
 
+@pytest.mark.long
 def test_a_seed_is_a_picture_and_another_seed_another(artist):
     one, same, other = artist.draw(1, 7), artist.draw(1, 7), artist.draw(1, 8)
     assert np.array_equal(one.color, same.color) and np.array_equal(one.labels, same.labels)
@@ -113,6 +115,7 @@ def test_a_seed_is_a_picture_and_another_seed_another(artist):
     assert not np.array_equal(one.color, other.color)
 
 
+@pytest.mark.long
 def test_classes_depth_and_colour_agree(scenes):
     for scene in scenes:
         assert scene.labels.max() < FAR and np.isfinite(scene.color).all()
@@ -127,6 +130,7 @@ def test_where_nothing_stands_nothing_is_traced():
     assert (traced.kind == BACKGROUND).all() and np.isinf(traced.depth).all()
 
 
+@pytest.mark.long
 def test_the_pictures_are_as_varied_as_they_are_meant_to_be(scenes):
     shares = np.array([[(scene.labels == k).mean() for k in range(FAR)] for scene in scenes])
     # A third of the width of the training pictures, of which five in six show wood.
@@ -137,6 +141,7 @@ def test_the_pictures_are_as_varied_as_they_are_meant_to_be(scenes):
     assert 8 <= sum(each.depth is None for each in drawings) <= 30
 
 
+@pytest.mark.long
 def test_wood_differs_from_what_is_around_it(scenes):
     """Labels that lay beside what was drawn would see the same colours inside and outside."""
     contrasts = []
@@ -148,6 +153,7 @@ def test_wood_differs_from_what_is_around_it(scenes):
     assert len(contrasts) > 15 and np.median(contrasts) > 20.0
 
 
+@pytest.mark.long
 def test_before_a_real_picture_nobody_knows_what_is_ground(artist):
     real = np.full((300, 400, 3), (10, 200, 30), np.uint8)
     before = Artist(96, (real,))

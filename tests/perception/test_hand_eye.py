@@ -52,6 +52,7 @@ angles = st.tuples(*[st.floats(-0.08, 0.08)] * 3)
 shifts = st.tuples(*[st.floats(-0.02, 0.02)] * 3)
 
 
+@pytest.mark.long
 @settings(max_examples=12, deadline=None)
 @given(angles, shifts, st.floats(0.99, 1.01), st.floats(0.0, 0.25), st.integers(0, 1000))
 def test_a_camera_is_found_wherever_it_is_mounted(turn, shift, focal, noise, seed):
@@ -66,6 +67,7 @@ def test_a_camera_is_found_wherever_it_is_mounted(turn, shift, focal, noise, see
     assert found.pixels == pytest.approx(np.sqrt(2) * noise, abs=0.02 + 0.1 * noise)
 
 
+@pytest.mark.long
 def test_the_standard_deviations_are_those_of_the_errors():
     true, errors, told = mounted((0.01, -0.01, 0.005), (0.003, 0.0, -0.004)), [], []
     for seed in range(20):

@@ -129,6 +129,7 @@ def test_without_drift_it_stays_at_zero_within_its_deviation(seed):
     assert np.linalg.norm(drive.localiser.estimate.T_map_odom.translation) < 0.006
 
 
+@pytest.mark.long
 @given(st.integers(0, 10**6), st.floats(-0.05, 0.05), st.floats(-0.06, 0.06))
 @settings(max_examples=5)
 def test_drift_is_found_within_its_interval(seed, slip, turns):

@@ -171,6 +171,7 @@ def test_a_survey_that_starts_and_stops_tells_the_offset_though_its_wheels_slip(
     assert rider.monitor.error is None, "the mount is told while the base stands"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("how", "ground", "jitter"), [("move_arm", {}, 0.01), ("drive", {"slip": 0.08, "tilt": 0.007}, 0.005)]
 )
@@ -198,6 +199,7 @@ def test_an_offset_is_complained_about_that_is_certain_and_matters(offset, sd, c
         assert dict(warning.values) == pytest.approx({"offset": 20.0, "interval": 13.0})
 
 
+@pytest.mark.long
 def test_a_camera_whose_times_are_right_is_not_complained_about():
     riders = [Rider(0.0, np.random.default_rng(seed), 0.001, jitter=0.01) for seed in range(6)]
     assert not any(rider.move_arm().drive().monitor.time.warning for rider in riders)

@@ -16,8 +16,6 @@ from perception.segmentation.segmenter import LabelImageSegmenter, choose_segmen
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.model.robot import RobotModel
 
-pytestmark = pytest.mark.long
-
 
 def distance(point, start, end):
     """From a point to a segment (m)."""
@@ -82,6 +80,7 @@ def elbow(angle):
 
 
 # As it comes to rest after the cut; and jogged up from there, near the post, rolled, and turned over.
+@pytest.mark.long
 @pytest.mark.parametrize("after", [elbow(-2.213), elbow(-1.471), elbow(-1.021), elbow(-0.098)])
 def test_what_the_network_takes_for_wood_near_by_or_turned_over_is_nothing_in_the_way(after):
     model, row, camera = RobotModel(), grow(VineyardConfig(), 0), Camera(CameraConfig(), 0)
@@ -103,6 +102,7 @@ def test_what_the_network_takes_for_wood_near_by_or_turned_over_is_nothing_in_th
     assert points <= {point.point_id for point in seen.points().points}, "nothing was cut"
 
 
+@pytest.mark.long
 def test_while_a_joint_is_jogged_nothing_is_taken_for_cut_or_left_open():
     model, row, camera = RobotModel(), grow(VineyardConfig(), 5), Camera(CameraConfig(), 5)
     seen = Perception(PerceptionConfig(), choose_segmenter("network", threads=1), model)

@@ -93,6 +93,7 @@ def test_a_picture_of_noise_gives_no_point(tmp_path):
     assert said["points"] == [] and said["undecided"]
 
 
+@pytest.mark.long
 def test_a_picture_of_something_else_is_called_unfamiliar(tmp_path):
     Image.fromarray(skimage.data.hubble_deep_field()).save(tmp_path / "vine.jpg")
     said = run(tmp_path, tmp_path / "out")
@@ -124,6 +125,7 @@ def test_what_cannot_be_is_refused_in_words_and_nothing_is_written(files, tmp_pa
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "words",
     [

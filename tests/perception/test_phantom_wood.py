@@ -21,8 +21,6 @@ from perception.segmentation.frame import decode_frame
 from rolling_panda.messages.types import WOOD_CLASSES
 from rolling_panda.model.robot import RobotModel
 
-pytestmark = pytest.mark.long
-
 BACKGROUND, POST, TRUNK, CORDON = (WOOD_CLASSES.index(kind) for kind in ("background", "post", "trunk", "cordon"))
 
 
@@ -54,6 +52,7 @@ def lean(capsule):
     return math.degrees(math.acos(min(1.0, abs(along[2]) / np.linalg.norm(along))))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [0, 11])
 def test_after_minutes_of_standing_trunks_and_posts_are_upright_as_thick_as_they_are_and_in_the_row(seed):
     # Half a picture a second, as the camera at rest takes them: four minutes; the post at the row's start is in view.
@@ -158,6 +157,7 @@ def test_a_few_places_far_apart_are_no_wire():
     assert fit_cylinders("wire", cells, ObstacleConfig())[0] == []
 
 
+@pytest.mark.long
 def test_what_is_remembered_is_bounded_and_what_is_near_stays():
     known = ObstacleMap(ObstacleConfig(max_cells=1000))
     for x in np.arange(-0.4, 4.4, 0.6):

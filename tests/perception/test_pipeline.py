@@ -31,8 +31,6 @@ from rolling_panda.transport.codec import StrictDecoder, encode
 from rolling_panda.transport.inbox import Inbox
 from tests.support import onnx_by_hand
 
-pytestmark = pytest.mark.long
-
 
 @pytest.fixture(scope="module")
 def model():
@@ -62,6 +60,7 @@ def test_points_show_after_they_were_seen_often_enough_and_keep_their_names(mode
     assert results[3].frames == 4 and results[3].segmenter == "simulator labels" and results[3].canes
 
 
+@pytest.mark.long
 def test_close_ups_after_the_odometry_has_drifted_leave_points_where_the_map_has_their_canes(
     model, frames, monkeypatch
 ):
@@ -92,6 +91,7 @@ def test_close_ups_after_the_odometry_has_drifted_leave_points_where_the_map_has
     assert np.median([each[0] for each in expected if each.any()]) == pytest.approx(0.012, abs=0.003)
 
 
+@pytest.mark.long
 def test_pictures_from_near_find_the_place_after_the_wheels_have_slipped(model, frames):
     seen = Perception(PerceptionConfig(localise=True), LabelImageSegmenter(), model)
     for frame in frames:
@@ -106,6 +106,7 @@ def test_pictures_from_near_find_the_place_after_the_wheels_have_slipped(model, 
     assert seen.row_frame.T_map_odom.act(wood + [0.02, 0.0, 0.0])[0] == pytest.approx(wood[0], abs=0.004)
 
 
+@pytest.mark.long
 def test_close_ups_of_wood_that_the_wind_has_moved_do_not_lose_the_place_in_the_row(model, frames):
     config = PerceptionConfig(localise=True, close_up=CloseUpConfig(max_distance=1.2))
     seen, camera, other = (
@@ -376,6 +377,7 @@ def test_a_point_says_how_sure_it_is_and_what_is_near(model, frames):
     assert seen.points().rule == m.PruningRule()
 
 
+@pytest.mark.long
 def test_every_point_has_a_picture_that_is_drawn_anew_with_its_revision(model, frames):
     seen, points = shown(model, frames)
     for frame in frames:
@@ -432,6 +434,7 @@ def test_another_rule_keeps_the_names_of_the_spurs_cuts(model, frames):
         assert (new.revision > old.revision) is bool(moved > PerceptionConfig().tracker.position_tolerance)
 
 
+@pytest.mark.long
 def test_a_point_that_a_person_moves_stays_there_and_its_spur_gets_no_other(model, frames):
     seen, before = shown(model, frames)
     point = next(each for each in before if each.kind == "spur cut")
@@ -473,6 +476,7 @@ RULES = st.builds(
 )
 
 
+@pytest.mark.long
 @settings(max_examples=25)
 @given(st.lists(RULES, min_size=1, max_size=3))
 def test_what_a_rule_would_change_is_what_it_changes_and_taken_back_all_is_as_it_was(surveyed, rules):
@@ -496,6 +500,7 @@ def test_what_a_rule_would_change_is_what_it_changes_and_taken_back_all_is_as_it
     assert held(surveyed) == begun
 
 
+@pytest.mark.long
 def test_a_revision_never_has_two_contents_though_a_rule_is_taken_back(model, frames):
     seen, _ = shown(model, frames)
     contents = {}
@@ -508,6 +513,7 @@ def test_a_revision_never_has_two_contents_though_a_rule_is_taken_back(model, fr
             assert seen.answer(UndoRule(user="Ada", rule=rule)).ok
 
 
+@pytest.mark.long
 def test_a_rule_that_was_changed_since_or_never_cannot_be_taken_back(model, frames):
     seen, _ = shown(model, frames)
     assert seen.answer(UndoRule(user="Ada", rule=m.PruningRule())).reason == reasons.no_rule_before()
@@ -518,6 +524,7 @@ def test_a_rule_that_was_changed_since_or_never_cannot_be_taken_back(model, fram
     assert held(seen) == before
 
 
+@pytest.mark.long
 def test_frames_come_on_after_a_rule_was_taken_back_and_what_a_person_placed_stays(model, frames):
     seen, before = shown(model, frames)
     rule = m.PruningRule(nodes_kept=1)
@@ -535,6 +542,7 @@ def test_frames_come_on_after_a_rule_was_taken_back_and_what_a_person_placed_sta
     assert all(name in later for name in back)
 
 
+@pytest.mark.long
 def test_what_was_cut_meanwhile_does_not_come_back_with_the_rule(model, frames):
     seen, before = shown(model, frames)
     rule = m.PruningRule(nodes_kept=1)

@@ -29,8 +29,6 @@ from rolling_panda.commands import SetRule
 from rolling_panda.messages.robot import Intrinsics
 from rolling_panda.model.robot import RobotModel
 
-pytestmark = pytest.mark.long
-
 CONFIG, RULE = ObstacleConfig(), RuleConfig()
 GUYOT = RuleConfig(system="guyot")
 NUMBER = SpurNumber(2, 3)
@@ -274,6 +272,7 @@ def test_a_new_rule_leaves_other_wood(surveyed):
     assert max(c.end[2] for c in canes(seen)) > before + 0.04, "a node more stays"
 
 
+@pytest.mark.long
 def test_without_canes_rods_alone_are_told(surveyed):
     row, _ = surveyed
     config = PerceptionConfig(obstacles=ObstacleConfig(canes=False))

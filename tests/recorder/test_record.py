@@ -34,6 +34,7 @@ def publish(transport: Transport, seconds: float, recorder: subprocess.Popen[str
     return sent
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("killed", [True, False])
 def test_a_killed_recorder_loses_less_than_a_second_and_one_that_is_ended_nothing(
     endpoint: str, tmp_path: Path, killed: bool

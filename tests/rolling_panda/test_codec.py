@@ -95,7 +95,6 @@ def refused(kind: Any, tree: Any) -> None:
         DECODERS[kind].decode(msgspec.msgpack.encode(tree))
 
 
-@pytest.mark.long
 @given(MESSAGES)
 @MODEST
 def test_round_trip(message: Any) -> None:

@@ -22,6 +22,7 @@ from tests.support.processes.demo import CHILDREN, STARTUP_S, running_demo
 from tests.support.processes.local_router import free_port
 
 
+@pytest.mark.long
 @pytest.mark.paced
 def test_it_comes_up_with_a_link_that_works_once_and_ctrl_c_ends_it(tmp_path: Path) -> None:
     with running_demo(tmp_path) as demo:

@@ -124,6 +124,7 @@ def driven(seed, seconds):
     return world.digest
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seconds", [3.0, pytest.param(30.0, marks=pytest.mark.long)])
 def test_the_same_seed_gives_the_same_bytes(seconds):
     first = driven(1, seconds)

@@ -76,6 +76,7 @@ def values_of(code: str) -> set[str]:
     return {name for _, name, _, _ in Formatter().parse(reasons.CATALOGUE[code].text) if name}
 
 
+@pytest.mark.long
 def test_every_code_is_made_by_the_product():
     assert set(reasons.CATALOGUE) <= made_by_product() | set(made_by_page()), "reasons that nobody makes"
 

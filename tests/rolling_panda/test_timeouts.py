@@ -111,6 +111,7 @@ def test_each_violation_is_refused_by_name_with_values_reason_and_remedy(relatio
         assert str(first) in told and first.why in told and changed in told and "To do: " in told
 
 
+@pytest.mark.long
 @settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_a_configuration_within_the_bounds_is_refused_exactly_where_a_relation_does_not_hold(

@@ -18,8 +18,6 @@ from tests.support.certificates import self_signed
 from tests.support.fake_wire import FakeWire, telling
 from tests.support.running_server import PATIENCE_S, eventually, running_server
 
-pytestmark = pytest.mark.long
-
 
 def noted(server):
     """What the server has written into the log."""
@@ -249,6 +247,7 @@ def test_a_drag_at_sixty_a_second_is_never_too_much(plain):
         assert not [line for line in noted(plain) if line.code in codes and ("user", "pat") in line.values]
 
 
+@pytest.mark.long
 def test_one_session_has_a_limit_through_all_of_its_sockets():
     config = ServerConfig(session_messages_hz=60.0)
     with running_server(FakeWire(), config) as server, contextlib.ExitStack() as stack:
@@ -265,6 +264,7 @@ def test_one_session_has_a_limit_through_all_of_its_sockets():
         assert other.ping().wait(PATIENCE_S)
 
 
+@pytest.mark.long
 def test_who_has_no_session_waits_where_an_address_asks_too_often(monkeypatch):
     for name, value in (("_VISITOR_RATE_HZ", 0.01), ("_VISITOR_BURST", 20.0), ("_MAX_WAIT_S", 0.2)):
         monkeypatch.setattr(f"server.api.middleware.{name}", value)

@@ -40,6 +40,7 @@ def cut(wire, folder):
     wire.deliver(topics.CONTROLLER, at("DONE", "c1"))
 
 
+@pytest.mark.long
 def test_a_cut_has_its_pictures_also_after_a_restart_of_the_server(tmp_path):
     folder = tmp_path / "pictures" / "rp1"
     with running_server(wire := FakeWire(), state=tmp_path) as server, server.client(role="viewer") as client:
@@ -57,6 +58,7 @@ def test_a_cut_has_its_pictures_also_after_a_restart_of_the_server(tmp_path):
         assert client.get("/api/cuts/..%2f..%2fledger/after.jpg").status_code in (404, 422)
 
 
+@pytest.mark.long
 def test_a_damaged_picture_is_left_out_and_logged_once(tmp_path):
     folder = tmp_path / "pictures" / "rp1"
     with running_server(wire := FakeWire(), state=tmp_path) as server, server.client() as client:
@@ -70,6 +72,7 @@ def test_a_damaged_picture_is_left_out_and_logged_once(tmp_path):
         assert client.get("/api/cuts/c1/before.jpg").status_code == 200
 
 
+@pytest.mark.long
 def test_a_folder_that_cannot_be_written_costs_the_pictures_and_nothing_else(tmp_path):
     (tmp_path / "pictures").write_text("a file where the folder should be")
     with running_server(wire := FakeWire(), state=tmp_path) as server, server.client() as client:
@@ -87,6 +90,7 @@ def events(client):
     return client.get("/api/events").json()["events"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("image", [b"", b"\xff\xd8\xff no picture"])
 def test_a_corrupt_camera_image_costs_its_picture_only(tmp_path, image):
     with running_server(wire := FakeWire(), state=tmp_path) as server, server.client() as client:

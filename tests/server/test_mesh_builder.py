@@ -59,6 +59,7 @@ def test_faces_point_at_vertices_that_exist():
         assert np.isfinite(part.vertices).all()
 
 
+@pytest.mark.long
 def test_the_server_does_without_the_mesh_library():
     found = (
         "import sys, server.service; print([name for name in ('trimesh', 'scipy', 'networkx') if name in sys.modules])"

@@ -70,6 +70,7 @@ def test_health_and_version_are_open(server):
         assert visitor.get("/version").json()["name"] == "rolling-panda"
 
 
+@pytest.mark.long
 def test_the_description_is_open_but_only_to_be_read(server):
     with server.visitor() as visitor:
         assert visitor.get("/api/openapi.json").status_code == 200

@@ -250,6 +250,7 @@ def test_a_hold_that_paused_for_long_is_over_until_it_is_pressed_anew(late_page)
     assert sum("not renewed" in text for text in late_page.told()) == 1
 
 
+@pytest.mark.long
 def test_a_page_that_draws_a_robot_that_has_fallen_silent_may_not_hold():
     with holding_page(view_timeout_s=0.5) as page:
         page.robot_silent.set()
@@ -289,6 +290,7 @@ def test_a_page_that_has_not_drawn_the_robot_may_not_hold(server, page):
     assert not any(message.hold for message in sent)
 
 
+@pytest.mark.long
 def test_a_stop_ends_the_hold_of_the_page_that_held():
     with holding_page(hold_timeout_s=20.0) as page, page.server.client(user="bob") as other:
         other.post("/api/stop")

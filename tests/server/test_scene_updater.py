@@ -77,7 +77,6 @@ def test_a_preset_moves_the_cameras_of_who_asked_alone_and_viewers_may_too(serve
         never(other_view, placed)
 
 
-@pytest.mark.long
 def test_a_chosen_point_brings_the_cameras_of_who_chose_it_alone(server):
     def looks_at(x):
         return lambda told: told["type"] == "SetCameraLookAtMessage" and np.allclose(told["look_at"], (x, 0.75, 1.0))
@@ -128,7 +127,6 @@ def test_a_picture_of_the_camera_is_drawn_for_who_wants_it(server):
         hear(view, lambda message: message["type"] == "RemoveSceneNodeMessage" and message["name"] == "/cloud")
 
 
-@pytest.mark.long
 def test_a_drag_while_holding_does_not_wait_for_the_loops_turn_and_many_drags_are_not_all_told():
     wire = FakeWire()
     sent = wire.sent[topics.TELEOP.name]

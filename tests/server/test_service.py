@@ -113,6 +113,7 @@ def test_with_several_robots_each_has_certificates_of_its_own(served, tmp_path):
         service.run(given)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("plain", [True, False])
 def test_a_plain_wire_is_shown_and_logged(plain):
     wire = FakeWire()

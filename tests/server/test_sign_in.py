@@ -186,6 +186,7 @@ def test_signing_out_closes_the_page_at_once(link_server, link_visitor):
     assert link_visitor.get("/api/me", headers={"cookie": cookie}).status_code == 401
 
 
+@pytest.mark.long
 def test_many_bad_tokens_are_slowed_down_but_the_stop_is_not(link_visitor):
     with running_server(FakeWire()) as own, own.client() as signed_in:
         codes = [signed_in.post("/api/sign-in", json={"token": "guess"}).status_code for _ in range(6)]

@@ -6,6 +6,7 @@ import io
 import time
 from types import SimpleNamespace
 
+import pytest
 from fastapi import FastAPI
 from httpx import ASGITransport, AsyncClient
 
@@ -17,6 +18,7 @@ from tests.support.fake_wire import FakeWire, joints
 from tests.support.running_server import eventually, running_server
 
 
+@pytest.mark.long
 def test_everybody_who_is_signed_in_gets_the_report_and_its_cuts_as_a_table():
     cut = CutReport(
         cut_id="c1",
@@ -63,6 +65,7 @@ def test_a_frame_that_pages_are_told_of_is_there_though_it_is_not_kept_yet():
     assert asyncio.run(asked(1)).status_code == 404
 
 
+@pytest.mark.long
 def test_the_timeline_is_given_as_the_controller_tells_it():
     event = TimelineEvent(at=1769840010.0, kind="mode", before="IDLE", mode="READY", reason=reasons.said("armed"))
     told = Timeline(began_at=1769840000.0, ended_at=1769850000.0, events=(event,))
@@ -74,6 +77,7 @@ def test_the_timeline_is_given_as_the_controller_tells_it():
         assert (event["kind"], event["before"], event["mode"]) == ("mode", "IDLE", "READY")
 
 
+@pytest.mark.long
 def test_the_diagnostics_tell_versions_and_what_comes_in_of_each_topic():
     with running_server(FakeWire()) as server, server.client(role="viewer") as client:
         began = time.monotonic() - 1.0

@@ -206,6 +206,7 @@ def test_a_hold_that_lapsed_is_not_another_holders():
     assert teleop.next_message(12.0).user == "bea"
 
 
+@pytest.mark.long
 def test_one_object_alone_writes_the_aim_and_sends_the_target():
     package = Path(teleop.__file__).resolve().parents[1]
     for name in ("set_command", "clear_target", "next_message", "send_teleop", "follows_gizmo"):

@@ -101,6 +101,7 @@ def test_every_used_attribute_is_in_the_contract() -> None:
             assert node.attr in known, ast.unparse(node)
 
 
+@pytest.mark.long
 def test_nothing_outside_the_adapter_knows_viser_from_inside() -> None:
     for package in (
         "rolling_panda",

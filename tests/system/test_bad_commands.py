@@ -58,6 +58,7 @@ def overheard_token(session: zenoh.Session) -> str:
     return str(command.get("token", ""))
 
 
+@pytest.mark.long
 def test_bad_commands_move_nothing_and_are_told(tmp_path: Path) -> None:
     with LiveRobot(tmp_path) as robot:
         robot.wait(lambda: robot.mode() == "IDLE", 30, "the controller")

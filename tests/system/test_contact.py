@@ -12,8 +12,6 @@ from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import ARM_Q, RobotModel
 from tests.support.worlds.contact_world import USER, ContactWorld, capsule_of
 
-pytestmark = pytest.mark.long
-
 HOME = np.array([0.0, 0.0, 0.0, 0.0, 0.0, *ControllerConfig().work.home])
 SPOTS = Spots(RobotModel())
 UP, ALONG = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
@@ -48,6 +46,7 @@ def until_touched(loop: ContactWorld) -> float:
     return next(at for at, force, _ in loop.touches if force > 0.5)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("kind", "part", "joints", "axis", "radius", "speed", "most_n", "seen"),
     [
@@ -88,6 +87,7 @@ def test_it_rests_at_once_goes_back_and_says_what_it_was(
     assert loop.controller.mode == "PAUSED"
 
 
+@pytest.mark.long
 def test_a_cane_is_pushed_aside_and_that_is_known() -> None:
     rod, _ = in_the_way("cane", "cutter", REACH, UP, 0.004, below=0.3)
     loop = ContactWorld((rod,), world=only(("cane_modulus",), "field"))
@@ -105,6 +105,7 @@ def test_a_cane_is_pushed_aside_and_that_is_known() -> None:
     assert strongest > 3.0 and 0.4 * then < strongest < 1.3 * then
 
 
+@pytest.mark.long
 def test_a_cane_that_is_touched_at_its_foot_stops_the_arm() -> None:
     rod, _ = in_the_way("cane", "cutter", REACH, UP, 0.006, below=0.06)
     loop = ContactWorld((rod,), world=only(("cane_modulus",), "field"))
@@ -113,6 +114,7 @@ def test_a_cane_that_is_touched_at_its_foot_stops_the_arm() -> None:
     assert loop.run_until(lambda: loop.touch is not None, 1.0)
 
 
+@pytest.mark.long
 def test_in_automatic_work_a_post_that_nobody_saw_stops_it_before_the_tracking_error_does() -> None:
     post = Rod("post", np.array([0.55, 0.42, 0.4]), np.array([0.55, 0.42, 1.6]), 0.04, 0.04)
     loop = ContactWorld((post,))
@@ -125,6 +127,7 @@ def test_in_automatic_work_a_post_that_nobody_saw_stops_it_before_the_tracking_e
     assert not any(at > loop.now - 1.0 for at, *_ in loop.touches)
 
 
+@pytest.mark.long
 def test_in_automatic_work_a_cane_that_pushes_puts_its_cut_off_and_does_not_stop_the_work() -> None:
     # Its foot is just below the way of the blades, where it is stiff.
     cane = Rod("cane", np.array([0.615, 0.7, 0.93]), np.array([0.615, 0.7, 1.3]), 0.005, 0.004, -1, 9, 9, 0)
@@ -142,6 +145,7 @@ def test_in_automatic_work_a_cane_that_pushes_puts_its_cut_off_and_does_not_stop
     assert len(loop.cut_ids) > 2
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("preset", "seed"), [("calm", 3), ("field", 3), ("field", 2604), ("storm", 3)])
 def test_work_with_nothing_in_the_way_does_not_stop(preset: str, seed: int) -> None:
     loop = ContactWorld(world=PRESETS[preset], seed=seed)

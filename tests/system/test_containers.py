@@ -39,6 +39,7 @@ def last_stage() -> list[tuple[str, str]]:
     return steps[max(i for i, (head, _) in enumerate(steps) if head == "FROM") :]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["compose.yaml", "compose.real.yaml"])
 def test_the_compose_files_are_what_the_compose_specification_allows(name: str, tmp_path: Path) -> None:
     assert allowed(ROOT / name) == ""

@@ -13,6 +13,7 @@ from tests.system.test_lost_processes import drive
 pytestmark = pytest.mark.alone
 
 
+@pytest.mark.long
 def test_a_full_disk_stops_the_robot_and_the_stop_still_works(tmp_path: Path) -> None:
     with LiveRobot(tmp_path) as robot:
         drive(robot)

@@ -30,6 +30,7 @@ def test_messages_and_errors_need_the_standard_library_and_msgspec_only() -> Non
         assert {name.split(".")[0] for name in outside} <= sys.stdlib_module_names | {"msgspec"}, file
 
 
+@pytest.mark.long
 def test_a_socket_is_opened_by_few() -> None:
     users = {
         str(file.relative_to(ROOT))

@@ -55,6 +55,7 @@ def test_base_and_arm_are_still_soon_after_a_process_is_killed(tmp_path: Path, n
     assert trace.read(robot.trace).stopping_time(killed) < LIMIT_S
 
 
+@pytest.mark.long
 def test_a_killed_controller_is_missed_and_a_new_one_moves_nothing_by_itself(tmp_path: Path) -> None:
     with LiveRobot(tmp_path) as robot:
         drive(robot)
@@ -73,6 +74,7 @@ def test_a_killed_controller_is_missed_and_a_new_one_moves_nothing_by_itself(tmp
     assert trace.read(robot.trace).stopping_time(killed) < LIMIT_S
 
 
+@pytest.mark.long
 def test_the_server_says_that_the_bridge_has_gone_and_keeps_its_last_state(tmp_path: Path) -> None:
     with LiveRobot(tmp_path) as robot:
         drive(robot)

@@ -133,6 +133,7 @@ def port_of(demo: TracedDemo) -> int:
     return int(found[1])
 
 
+@pytest.mark.long
 def test_whoever_has_no_certificate_of_this_run_reads_nothing_and_moves_nothing(demo: TracedDemo) -> None:
     assert len(TOPICS) > 20 and len(SERVICES) > 3
     ways = outsiders(demo.trace.parent, port_of(demo))

@@ -24,6 +24,7 @@ def lived(steps, seed, **changes):
     return world
 
 
+@pytest.mark.long
 def test_random_steps_of_everything_together_break_nothing():
     told = lived(8_000, seed=2).judge.told
     for what in ("cuts", "releases", "starts of the bridge", "starts of the controller", "READY to TELEOP"):
@@ -39,6 +40,7 @@ def test_a_million_random_steps_of_everything_together_break_nothing(capsys):
     assert told["cuts"] > 1000
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("kills", "steps"), [(5, 3_000), pytest.param(500, 10_000, marks=pytest.mark.slow)])
 def test_a_controller_that_is_killed_around_a_cut_never_cuts_twice_and_asks_a_person(kills, steps, capsys):
     killed, seed, unknown = 0, 50, 0

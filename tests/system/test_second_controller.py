@@ -63,6 +63,7 @@ def site(tmp_path: Path) -> Iterator[Site]:
         yield Site(tmp_path, stack)
 
 
+@pytest.mark.long
 def test_it_waits_says_so_and_takes_over_after_the_first_has_ended_or_was_killed(site: Site) -> None:
     first = site.process("controller", "one", "first")
     until(lambda: bool(site.held[1]) and site.mode() == "IDLE")

@@ -31,6 +31,7 @@ def ready(robot: LiveRobot) -> None:
     robot.wait(lambda: robot.mode() == "READY", 20, "READY")
 
 
+@pytest.mark.long
 def test_the_tool_follows_a_held_target_and_rests_when_nothing_more_comes(tmp_path: Path) -> None:
     with LiveRobot(tmp_path) as robot:
         ready(robot)

@@ -193,6 +193,7 @@ class Operators(RuleBasedStateMachine):
         self.folder.cleanup()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("examples", "steps"), [(8, 30), pytest.param(300, 50, marks=pytest.mark.slow)])
 def test_whoever_decides_in_whatever_order(examples, steps):
     with running_server(FakeWire()) as server:

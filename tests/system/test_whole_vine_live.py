@@ -17,6 +17,7 @@ NOTE_SEEN_AT_PRESS = """() => addEventListener("keydown", () => {
 pytestmark = [pytest.mark.browser, pytest.mark.alone]
 
 
+@pytest.mark.long
 def test_what_one_press_accepts_is_what_was_shown_and_one_press_takes_it_back(
     tmp_path: Path, chromium_path: str
 ) -> None:

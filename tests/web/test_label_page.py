@@ -142,6 +142,7 @@ def pixel(page: Page, x: float, y: float) -> list[int]:
     )
 
 
+@pytest.mark.long
 def test_strokes_made_while_the_program_is_away_are_saved_when_it_is_back(browser: Browser, dataset: Path) -> None:
     context = browser.new_context(viewport={"width": 1024, "height": 700})
     try:

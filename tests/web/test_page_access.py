@@ -34,6 +34,7 @@ USUAL = (
 )  # fmt: skip
 
 
+@pytest.mark.long
 def test_nothing_keeps_anybody_from_using_the_page(page: Page, server: PlayedServer, axe: str) -> None:
     found: list[str] = []
     for name in USUAL:
@@ -47,6 +48,7 @@ def test_nothing_keeps_anybody_from_using_the_page(page: Page, server: PlayedSer
     assert not found, "\n".join(found)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_axe_finds_nothing_on_any_screen(
     page: Page, server: PlayedServer, axe: str, scheme: Literal["light", "dark"]

@@ -38,6 +38,7 @@ def test_where_there_is_no_view_it_is_said_only_if_there_is_something_to_press(
     expect(page.locator("#grant-control")).to_be_visible()
 
 
+@pytest.mark.long
 def test_that_one_holds_control_is_said_for_a_moment_and_then_by_the_menu(page: Page, server: PlayedServer) -> None:
     server.control = held("other", "Bob")
     server.viewers = 2
@@ -78,6 +79,7 @@ def test_a_request_is_shown_and_granted_and_who_gave_is_told(page: Page, server:
     expect(page.locator("#request-control")).to_be_visible()
 
 
+@pytest.mark.long
 def test_who_holds_control_is_there_while_the_page_is_busy_but_not_when_it_hangs(
     page: Page, server: PlayedServer
 ) -> None:

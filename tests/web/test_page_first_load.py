@@ -85,6 +85,7 @@ def test_a_first_try_that_fails_is_no_alarm(fresh: Page) -> None:
     assert server.refused == 1 and fresh.evaluate("alarming") == []
 
 
+@pytest.mark.long
 def test_while_the_browser_itself_is_busy_the_server_is_not_said_to_be_silent(fresh: Page) -> None:
     server = PlayedServer()
     server.attach(fresh)
@@ -97,6 +98,7 @@ def test_while_the_browser_itself_is_busy_the_server_is_not_said_to_be_silent(fr
     assert not [text for text in fresh.evaluate("alarming") if "server" in text]
 
 
+@pytest.mark.long
 def test_a_server_that_never_says_anything_is_an_alarm(fresh: Page) -> None:
     LateServer().attach(fresh)
     fresh.goto(f"{ORIGIN}/")

@@ -101,6 +101,7 @@ def test_choosing_in_the_order_of_work_brings_the_queue_and_the_other_way_round(
     is_shown(page, name)
 
 
+@pytest.mark.long
 def test_at_work_list_and_picture_go_along_but_not_from_under_somebodys_hand(page: Page, server: PlayedServer) -> None:
     at_work(server, "p40")
     is_shown(page, "p40")

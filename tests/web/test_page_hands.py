@@ -173,6 +173,7 @@ SMALL = """() => [...document.querySelectorAll("body *")].flatMap(each => {
 })"""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_with_gloves_everything_is_large_and_contrasts(
     page: Page, axe: str, subtests: pytest.Subtests, scheme: Any

@@ -94,6 +94,7 @@ def test_the_files_of_the_made_up_language_would_pass_the_check(tmp_path_factory
     assert problems(folder) == []
 
 
+@pytest.mark.long
 def test_every_word_of_every_state_is_in_the_language_of_the_browser(
     context: BrowserContext, subtests: pytest.Subtests
 ) -> None:

@@ -63,6 +63,7 @@ def test_without_a_cut_it_says_so_everywhere(page: Page, server: PlayedServer) -
     assert server.cut_pictures_fetched == []
 
 
+@pytest.mark.long
 def test_a_session_lasts_until_now_and_one_that_has_ended_until_its_last_record(
     page: Page, server: PlayedServer
 ) -> None:
@@ -84,6 +85,7 @@ def test_nothing_of_the_view_behind_shows_through(page: Page, server: PlayedServ
     expect(blades).to_be_hidden()
 
 
+@pytest.mark.long
 def test_a_cut_has_its_pictures_and_says_where_one_is_missing(page: Page, server: PlayedServer) -> None:
     server.report = report(cut(1), cut(2, "UNKNOWN"), cut(3, "", ended_at=0.0), cut(4, "FAILED_NOT_CUT", cut_id=""))
     server.cut_pictures = {("c1", "before"): cut_picture(False), ("c1", "after"): cut_picture(True)}
@@ -163,6 +165,7 @@ def test_what_a_person_left_as_it_is_is_listed_with_the_reason(page: Page, serve
     )
 
 
+@pytest.mark.long
 def test_it_is_filtered_by_vine_and_outcome(page: Page, server: PlayedServer) -> None:
     server.report = report(cut(1), cut(2, "UNKNOWN"), cut(3, vine=2), cut(4, "UNKNOWN", vine=2, wrong_by="Eve"))
     open_screen(page, "report")
@@ -214,6 +217,7 @@ def test_a_second_press_takes_nothing_back_that_the_report_does_not_show_yet(pag
     assert server.posted == [("/api/points/p1/judge", {"wrong": True})]
 
 
+@pytest.mark.long
 def test_it_goes_on_without_the_server_with_what_it_has(page: Page, server: PlayedServer) -> None:
     server.report = report(cut(1))
     open_screen(page, "report")

@@ -330,6 +330,7 @@ def test_a_cut_of_unknown_outcome_is_answered_by_who_has_looked(page: Page, serv
     expect(page.locator(".review-reasons")).to_be_hidden()
 
 
+@pytest.mark.long
 @pytest.mark.alone  # It is about time: how long the page keeps a person waiting.
 def test_thirty_four_cuts_take_thirty_four_presses_and_forty_seconds_at_a_second_each(
     page: Page, server: DecidingServer

@@ -96,6 +96,7 @@ def samples(page: Page) -> list[float]:
     return at
 
 
+@pytest.mark.long
 def test_the_other_robot_is_seen_and_chosen_and_nothing_reaches_the_wrong_one(pages: Page, hall: PlayedHall) -> None:
     page, (one, two) = pages, hall.robots.values()
     first, second = (page.locator(f'[data-robot="{name}"]') for name in hall.robots)

@@ -120,6 +120,7 @@ def fits(page: Page, width: int, height: int) -> None:
     assert page.locator("button:visible, a.button:visible, rp-screens a:visible").evaluate_all(CUT) == []
 
 
+@pytest.mark.long
 def test_every_screen_fits_every_window(page: Page, server: PlayedServer, subtests: pytest.Subtests) -> None:
     working(page, server)
     for name in SCREENS:
@@ -171,6 +172,7 @@ TOLD: dict[str, Callable[[Page, PlayedServer], None]] = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("language", ["de", "fr"])
 def test_whatever_is_told_every_control_can_be_pressed(
     page: Page, server: PlayedServer, subtests: pytest.Subtests, language: str
@@ -193,6 +195,7 @@ def test_whatever_is_told_every_control_can_be_pressed(
                 assert page.locator("button:visible, a.button:visible").evaluate_all(CUT) == []
 
 
+@pytest.mark.long
 def test_the_view_has_most_of_the_window_and_no_banner_takes_any_of_it(
     page: Page, server: PlayedServer, subtests: pytest.Subtests
 ) -> None:

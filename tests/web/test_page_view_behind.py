@@ -116,6 +116,7 @@ def frames_in(view: Frame, milliseconds: int) -> int:
     return int(view.evaluate("client.frames")) - int(before)
 
 
+@pytest.mark.long
 @pytest.mark.alone  # It counts frames in a time.
 def test_behind_another_screen_the_client_goes_on_slowly_and_draws_nothing_until_it_is_seen(view: Frame) -> None:
     view.evaluate(CLIENT)

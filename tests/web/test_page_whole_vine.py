@@ -180,6 +180,7 @@ def test_a_press_right_after_a_cut_has_changed_does_not_accept_it(page: Page, se
     until(page, lambda: asked(server, "accept").keys() == {"p2"})
 
 
+@pytest.mark.long
 def test_only_what_was_in_sight_is_accepted(page: Page, server: DecidingServer) -> None:
     server.undecided_sites = ()
     show(server, *(sure(number) for number in range(1, 21)))
