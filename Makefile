@@ -37,15 +37,15 @@ library = $(BIN)/python -c 'import ctypes; ctypes.CDLL("$(1)")' 2>/dev/null || \
 demo: $(VENV)/.project
 	@exec $(BIN)/rolling-panda demo $(ARGS)
 
-# First the tests that others may run beside, one more at once than there are cores, since a browser's test waits as much as
-# it computes; then those that keep real time, two at once; then those that anything beside them would disturb. Training
-# and others' controllers have their own targets, since nothing else needs their packages. $(call stages,WHICH): all three.
+# $(call stages,WHICH): first the tests that others may run beside; then those that keep real time, two at once; then those
+# that anything beside them would disturb. Training and others' controllers have their own targets, since nothing else
+# needs their packages.
 PEER_TESTS := tests/benchmarks/test_peers.py
 TRAINING_TESTS := tests/perception/test_training.py tests/perception/test_wide_training.py tests/perception/test_tune.py \
 	tests/perception/test_familiarity.py tests/perception/test_int8.py \
 	tests/benchmarks/test_familiarity_scores.py
 WITHOUT_EXTRAS := $(PEER_TESTS:%=--ignore %) $(TRAINING_TESTS:%=--ignore %)
-stages = $(BIN)/pytest -n $$(($$(nproc) + 1)) --dist worksteal -m "$(1) and not (paced or alone or slow)" $(WITHOUT_EXTRAS) && \
+stages = $(BIN)/pytest -n auto --dist worksteal -m "$(1) and not (paced or alone or slow)" $(WITHOUT_EXTRAS) && \
 	$(BIN)/pytest -n 2 --dist loadfile -m "paced and $(1) and not (alone or slow)" $(WITHOUT_EXTRAS) && \
 	$(BIN)/pytest -m "alone and $(1) and not slow" $(WITHOUT_EXTRAS)
 test: check browser systemd drivers

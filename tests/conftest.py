@@ -34,8 +34,8 @@ def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> 
 
 
 def pytest_xdist_auto_num_workers() -> int:
-    """Three workers for two cores: half of their time tests wait, for a browser or a time limit."""
-    return len(os.sched_getaffinity(0)) * 3 // 2
+    """Two workers a core: half of their time tests wait, for a browser or a time limit."""
+    return 2 * len(os.sched_getaffinity(0))
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:

@@ -118,6 +118,7 @@ def spread_along(drive: Drive) -> float:
     return float(np.sqrt(drive.localiser.estimate.covariance[X, X]))
 
 
+@pytest.mark.long
 @given(st.integers(0, 10**6))
 @settings(max_examples=4)
 def test_without_drift_it_stays_at_zero_within_its_deviation(seed):

@@ -147,6 +147,7 @@ class Rider:
 offsets = st.floats(-0.06, 0.06)
 
 
+@pytest.mark.long
 @settings(max_examples=12, deadline=None, phases=(Phase.explicit, Phase.generate))
 @given(offsets, turns, st.floats(0.0, 0.0015), st.integers(0, 1000))
 def test_pictures_in_motion_tell_time_and_mount_apart(late, turn, noise, seed):

@@ -75,6 +75,7 @@ def test_without_depth_points_are_pixels_only(files, tmp_path):
         assert 0 <= point["pixel"][0] < 848 and 0 <= point["pixel"][1] < 480 and point["reason"]
 
 
+@pytest.mark.long
 def test_the_files_have_the_size_of_the_photograph(files, tmp_path):
     folder, _, _ = files
     with Image.open(folder / "vine.jpg") as image:

@@ -130,12 +130,14 @@ def test_close_ups_of_wood_that_the_wind_has_moved_do_not_lose_the_place_in_the_
     assert seen.row_frame.lost is not None, "pictures of the row do"
 
 
+@pytest.mark.long
 def test_the_same_frames_give_the_same_points_and_they_fit_the_wire(model, frames):
     first, second = ([p.process(frame) for frame in frames][-1] for p in (perception(model), perception(model)))
     assert encode(first) == encode(second)
     assert StrictDecoder(m.PruningPoints).decode(encode(first)) == first
 
 
+@pytest.mark.long
 def test_a_corrupt_frame_changes_nothing(model, frames):
     seen, undisturbed = perception(model), perception(model)
     for frame in frames[:3]:

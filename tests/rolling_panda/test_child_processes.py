@@ -52,6 +52,7 @@ def test_a_kill_is_told_by_its_name(children: ChildProcesses) -> None:
     assert exit_of(children).cause == "by signal 9 (SIGKILL)"
 
 
+@pytest.mark.long
 def test_end_leaves_nothing_of_those_that_will_not_and_of_their_children(children: ChildProcesses) -> None:
     family = f"import subprocess, sys; subprocess.Popen([sys.executable, '-c', {STUBBORN + 'signal.pause()'!r}]); "
     children.start("patient", PATIENT)

@@ -52,6 +52,7 @@ def test_being_connected_is_not_being_up(endpoint: str) -> None:
         assert cli.main(["status", "--plain-wire", "--connect", endpoint, "--wait", "0.3", "server"]) == 1
 
 
+@pytest.mark.long
 def test_without_a_router_it_says_how_to_name_another(capsys: pytest.CaptureFixture[str]) -> None:
     with socket.socket() as nobody:
         nobody.bind(("127.0.0.1", 0))

@@ -261,6 +261,7 @@ def test_dragging_in_the_view_counts_as_holding(page: Page, server: PlayedServer
     until(page, lambda: not server.holds()[-1])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("renderer", "smooth", "ratio"),
     [
@@ -352,6 +353,7 @@ def test_the_sign_in_link_is_used_once_and_leaves_the_address(tab: Page) -> None
     expect(tab.locator("#mode")).to_have_attribute("data-mode", "READY")
 
 
+@pytest.mark.long
 def test_a_busy_page_does_not_take_its_own_pause_for_a_lost_link(page: Page, server: PlayedServer) -> None:
     page.evaluate(STAND_STILL, 3.5)
     page.wait_for_timeout(500)

@@ -126,6 +126,7 @@ SMALL = """all => all.flatMap(each => {
 })"""
 
 
+@pytest.mark.long
 def test_a_fingertip_hits_everything_that_can_be_pressed(browser: Browser, server: PlayedServer) -> None:
     context = browser.new_context(viewport={"width": 1024, "height": 768}, locale="en-US", has_touch=True)
     page = context.new_page()

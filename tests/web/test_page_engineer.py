@@ -200,6 +200,7 @@ def calibrated(page: Page, server: PlayedServer, part: str, none: str) -> tuple[
     return use, row
 
 
+@pytest.mark.long
 def test_the_bases_calibration_is_told_measured_and_taken_from_the_panel(page: Page, server: PlayedServer) -> None:
     use, row = calibrated(page, server, "base", "none: the wheels are taken to be as drawn")
     server.calibration = RobotCalibration(header=m.Header(), base_views=33, base_refused=reasons.base_slipped(2.5, 1.0))
@@ -219,6 +220,7 @@ def test_the_bases_calibration_is_told_measured_and_taken_from_the_panel(page: P
     expect(use).to_have_attribute("aria-disabled", "true")
 
 
+@pytest.mark.long
 def test_the_arms_calibration_is_told_measured_and_taken_from_the_panel(page: Page, server: PlayedServer) -> None:
     use, row = calibrated(page, server, "arm", "none: the joints' zeros are taken to be as drawn")
     server.calibration = RobotCalibration(header=m.Header(), arm_views=25, arm_refused=reasons.arm_unsure(0.21, 0.05))

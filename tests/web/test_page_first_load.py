@@ -62,6 +62,7 @@ def fresh(browser: Browser) -> Iterator[Page]:
     context.close()
 
 
+@pytest.mark.long
 def test_a_server_that_takes_two_seconds_for_its_first_word_is_no_alarm(fresh: Page) -> None:
     server = LateServer()
     server.attach(fresh)

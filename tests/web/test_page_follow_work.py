@@ -165,6 +165,7 @@ def test_nobody_is_taken_along_while_nothing_is_cut_or_a_point_is_placed(page: P
     assert chosen(server) == []
 
 
+@pytest.mark.long
 def test_the_time_left_learns_from_the_cuts_that_are_made(page: Page, server: PlayedServer) -> None:
     def tells(stamp: float, *, cut: int, mode: m.Mode = "AUTO") -> None:
         server.controller = controller(mode, phase="APPROACH", header=m.Header(stamp=stamp))

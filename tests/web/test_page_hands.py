@@ -335,6 +335,7 @@ COVERED = """card => [...document.querySelectorAll("button, a, input, select")]
   }).map(each => each.id || each.className || each.textContent)"""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("size", [(1440, 900), (1280, 800), (1024, 768), (390, 844), (844, 390)])
 def test_the_first_sign_in_is_followed_by_hints_that_cover_no_control(
     browser: Browser, server: PlayedServer, size: tuple[int, int]

@@ -178,6 +178,7 @@ def test_without_a_link_that_is_the_one_alarm_until_it_is_back(page: Page, serve
     expect(page.locator("rp-telemetry .stale-note")).to_be_hidden()
 
 
+@pytest.mark.long
 def test_what_the_page_itself_has_not_heard_is_no_alarm_of_a_process(page: Page, server: PlayedServer) -> None:
     server.heard_s = 0.8
     page.wait_for_timeout(300)

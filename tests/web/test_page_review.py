@@ -285,6 +285,7 @@ def test_a_refused_decision_is_told_and_nothing_jumps_under_the_next_press(page:
     expect(page.locator(".review-refusals")).to_be_empty()
 
 
+@pytest.mark.long
 def test_a_point_that_vanishes_while_one_looks_at_it_cannot_be_decided(page: Page, server: DecidingServer) -> None:
     looking_at(page, "p1")
     server.points = server.points[1:]
@@ -423,6 +424,7 @@ def test_a_place_that_was_left_is_to_be_decided_again_when_another_matter_comes_
 # --- adjusting -------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_a_cut_is_dragged_along_its_cane_and_put_back_where_that_is_refused(page: Page, server: DecidingServer) -> None:
     review = looking_at(page, "p1")
     before = box_of(review.locator(".blade .tips"))
@@ -530,6 +532,7 @@ def test_the_work_takes_no_picture_away_from_who_decides(page: Page, server: Dec
     expect(page.locator("rp-review")).to_have_attribute("data-key", "p1")
 
 
+@pytest.mark.long
 @pytest.mark.alone  # It is about time: how long the page keeps a person waiting.
 def test_two_thousand_points_are_walked_through_without_a_standstill(page: Page, server: DecidingServer) -> None:
     rows = (point(number, "PROPOSED", vine=1 + number // 20, spur=1 + number // 2 % 10) for number in range(1, 2001))

@@ -131,6 +131,7 @@ def test_every_screen_fits_every_window(page: Page, server: PlayedServer, subtes
                 fits(page, width, height)
 
 
+@pytest.mark.long
 def test_a_whole_vine_fits_every_window(page: Page, server: PlayedServer, subtests: pytest.Subtests) -> None:
     STATES["whole-vine"](page, server)
     for width, height in SIZES:
@@ -224,6 +225,7 @@ def test_the_view_has_most_of_the_window_and_no_banner_takes_any_of_it(
     at_every_size("no link")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", SCREENS)
 def test_the_words_of_a_banner_have_room_on_every_screen(
     page: Page, server: PlayedServer, name: str, subtests: pytest.Subtests
@@ -293,6 +295,7 @@ def test_on_a_telephone_a_screen_has_one_scroller(page: Page, server: PlayedServ
     assert page.evaluate(scrollers) == ["rp-work"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("language", ["en", "de", "es", "fr", "it"])
 def test_on_a_telephone_the_controls_that_drive_are_in_sight(page: Page, server: PlayedServer, language: str) -> None:
     page.set_viewport_size({"width": 390, "height": 844})
@@ -341,6 +344,7 @@ def test_on_a_telephone_the_preview_leaves_the_view_and_a_stop_is_seen_whole(pag
         assert page.locator(part).evaluate(SEEN)[1] >= 44
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("language", ["en", "de", "es", "fr", "it"])
 def test_on_a_tablet_all_that_can_be_done_to_a_cut_is_in_sight(page: Page, server: PlayedServer, language: str) -> None:
     page.set_viewport_size({"width": 1024, "height": 768})

@@ -113,6 +113,7 @@ CUT_OFF = """() => [...document.querySelectorAll("button, a, select, h2, summary
 })"""
 
 
+@pytest.mark.long
 @pytest.mark.browser
 @pytest.mark.parametrize("language", OTHERS)
 @pytest.mark.parametrize("size", [(1280, 800), (390, 844)])

@@ -134,6 +134,7 @@ def test_behind_another_screen_the_client_goes_on_slowly_and_draws_nothing_until
     assert frames_in(view, 2000) >= 10
 
 
+@pytest.mark.long
 @pytest.mark.alone  # It counts frames in a time.
 def test_slow_frames_leave_as_much_time_to_the_robot_as_they_take(view: Frame) -> None:
     view.evaluate(CLIENT)

@@ -266,6 +266,7 @@ def touched(browser: Browser, server: DecidingServer) -> Iterator[Page]:
     context.close()
 
 
+@pytest.mark.long
 def test_fingers_do_the_same_on_a_telephone(touched: Page, server: DecidingServer) -> None:
     page = touched
     looking_at(page, "p1")
