@@ -3,6 +3,8 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+# Where Python keeps no compiled files, each of the many processes of a test compiles the program, and pytest every test.
+export PYTHONDONTWRITEBYTECODE :=
 TYPESCRIPT := typescript@5.9.3
 
 .PHONY: help demo test test-long test-peers test-training fast coverage check format docs bench mutation clean lock materials browser systemd drivers training peers

@@ -130,6 +130,7 @@ def test_random_targets_break_no_limit(arm: Panda, box: DeviceProcess) -> None:
         until(lambda: arm.read().fault is None)
 
 
+@pytest.mark.long
 def test_packets_lost_at_the_highest_speeds_break_no_limit(arm: Panda, box: DeviceProcess) -> None:
     """There libfranka's own limits would break the jerk: what the arm went on with by itself is beyond them."""
     with Hand(arm, box, REST) as hand:

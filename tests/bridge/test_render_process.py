@@ -28,6 +28,7 @@ def wait(renderer: CameraRenderer) -> Picture:
     raise AssertionError("no picture came")
 
 
+@pytest.mark.long
 def test_beside_the_physics_the_pictures_are_the_same_and_a_killed_renderer_comes_back() -> None:
     others = set(active_children())
     inline, beside = InlineRenderer(LENS, 7), RenderProcess(LENS, 7)

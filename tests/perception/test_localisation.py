@@ -201,6 +201,7 @@ def test_a_frame_that_comes_late_changes_nothing():
     assert after.T_map_base.isApprox(before.T_map_base, 1e-12) and np.array_equal(after.covariance, before.covariance)
 
 
+@pytest.mark.long
 @given(st.integers(0, 10**6))
 @settings(max_examples=4)
 def test_wood_of_another_row_is_refused_and_the_estimate_stays(seed):

@@ -59,6 +59,7 @@ def test_the_wires_before_the_robot_are_all_there(seen):
     assert sum(math.dist(wire.start, wire.end) for wire in near) > 1.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["labels", "network"])
 def test_no_wire_goes_past_the_end_post(name):
     segmenter = choose_segmenter(name)

@@ -69,6 +69,7 @@ def test_after_minutes_of_standing_trunks_and_posts_are_upright_as_thick_as_they
             assert abs(end[1] - 0.75) < 0.06, capsule
 
 
+@pytest.mark.long
 def test_what_is_seen_through_is_forgotten():
     standing, known = Standing(0, -0.5), ObstacleMap(ObstacleConfig())
     for _ in range(5):

@@ -205,6 +205,7 @@ def test_a_post_in_an_unfamiliar_picture_is_an_obstacle_all_the_same(model, fram
     assert {capsule.kind for capsule in seen.obstacles} >= {"cordon", "wire"}
 
 
+@pytest.mark.long
 def test_a_single_unfamiliar_picture_leaves_the_open_places_on_the_page(model, frames):
     segmenter = LabelImageSegmenter()
     seen = Perception(PerceptionConfig(), segmenter, model)
@@ -220,6 +221,7 @@ def test_a_single_unfamiliar_picture_leaves_the_open_places_on_the_page(model, f
     assert all(site.reason != segmenter.unfamiliar for site in seen.process(frames[-1]).undecided_sites)
 
 
+@pytest.mark.long
 def test_what_the_simulated_camera_sees_is_familiar_to_the_shipped_network_and_a_blurred_lens_is_not(model, frames):
     seen = Perception(PerceptionConfig(), choose_segmenter("network"), model)
     assert not seen.familiarity_unknown
@@ -305,6 +307,7 @@ def test_another_rule_changes_the_points_at_once_and_back_again(model, frames):
         assert np.linalg.norm(after - point.position, axis=1).min() < 0.006
 
 
+@pytest.mark.long
 def test_frames_after_another_rule_follow_it(model, frames):
     seen, _ = shown(model, frames)
     seen.answer(SetRule(user="Ada", rule=m.PruningRule(nodes_kept=1)))

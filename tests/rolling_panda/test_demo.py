@@ -74,6 +74,7 @@ def test_when_the_demo_itself_is_killed_nothing_outlives_it(tmp_path: Path) -> N
         assert demo.ends() == -signal.SIGKILL
 
 
+@pytest.mark.long
 @pytest.mark.paced
 def test_a_process_that_cannot_start_is_told_with_its_reason(tmp_path: Path) -> None:
     config = tmp_path / "robot.toml"

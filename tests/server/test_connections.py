@@ -107,6 +107,7 @@ def test_a_body_that_is_half_sent_is_ended_in_time(either):
     assert said.startswith(b"HTTP/1.1 408 ") and b"body did not come in time" in said
 
 
+@pytest.mark.long
 def test_a_body_goes_on_no_longer_after_an_early_answer(plain):
     with opened(plain) as connection:
         connection.sendall(BODY % b"http://elsewhere.example")
@@ -230,6 +231,7 @@ def test_many_bytes_in_few_messages_are_too_much_as_well(plain):
         eventually(lambda: reasons.view_closed("amy", cause) in noted(plain))
 
 
+@pytest.mark.long
 def test_a_drag_at_sixty_a_second_is_never_too_much(plain):
     with (
         plain.client(user="pat") as client,

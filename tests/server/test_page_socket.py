@@ -233,6 +233,7 @@ def test_a_hold_that_paused_for_a_moment_begins_anew_from_the_tool(late_page):
     assert sum("not renewed" in text for text in late_page.told()) == 1
 
 
+@pytest.mark.long
 def test_a_hold_that_paused_for_long_is_over_until_it_is_pressed_anew(late_page):
     time.sleep(2.2)
     late_page.look()

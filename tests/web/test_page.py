@@ -360,6 +360,7 @@ def test_a_busy_page_does_not_take_its_own_pause_for_a_lost_link(page: Page, ser
     assert len(server.sockets) == 1
 
 
+@pytest.mark.long
 def test_a_silent_link_is_given_up_and_tried_again(page: Page, server: PlayedServer) -> None:
     server.silent = True
     until(page, lambda: len(server.sockets) > 1, seconds=10.0)

@@ -65,6 +65,7 @@ def test_axe_finds_nothing_on_any_screen(
 
 
 # A page of its own for each state takes a minute; these two have the most in the least room.
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name",
     [pytest.param(n, marks=() if n in ("all-states", "teleoperate-base") else pytest.mark.slow) for n in STATES],

@@ -81,6 +81,7 @@ CASES = {
 }
 
 
+@pytest.mark.long
 def test_the_first_button_that_advice_names_can_be_pressed(
     page: Page, server: PlayedServer, subtests: pytest.Subtests
 ) -> None:
@@ -101,6 +102,7 @@ def test_the_first_button_that_advice_names_can_be_pressed(
                 expect(page.locator(case.button)).to_have_attribute("aria-disabled", "false")
 
 
+@pytest.mark.long
 def test_once_resume_is_pressed_nothing_advises_to_press_it(page: Page, server: PlayedServer) -> None:
     server.controller = mode("PAUSED", "teleoperation")
     show(server, WAITS)
@@ -113,6 +115,7 @@ def test_once_resume_is_pressed_nothing_advises_to_press_it(page: Page, server: 
     expect(page.locator("#alarms li")).to_have_count(0)
 
 
+@pytest.mark.long
 def test_a_robot_that_stands_for_a_picture_tells_so_and_asks_for_nothing(page: Page, server: PlayedServer) -> None:
     server.controller = mode("AUTO", phase="APPROACH", reason=reasons.waits_for_picture(6.0))
     show(server, TAKEN)

@@ -27,6 +27,7 @@ def tool(page: Page, panel: str, what: str):
     return page.locator(f'[data-panel="{panel}"] [data-arrange="{what}"]')
 
 
+@pytest.mark.long
 def test_panels_are_moved_hidden_shown_and_remembered_by_keys_alone(page: Page, server: PlayedServer) -> None:
     open_screen(page, "engineer")
     assert order(page) == USUAL
@@ -138,6 +139,7 @@ def test_the_way_of_the_base_is_counted_from_a_press_on_whatever_screen_is_open(
     expect(way("distance")).to_have_text("0.300 m")
 
 
+@pytest.mark.long
 def test_the_cameras_calibration_is_told_checked_and_taken_from_its_panel(page: Page, server: PlayedServer) -> None:
     panel = page.locator("rp-calibration")
     use, row = panel.locator("#use-camera"), lambda name: panel.locator(f'[data-calibration="{name}"]')
@@ -162,6 +164,7 @@ def test_the_cameras_calibration_is_told_checked_and_taken_from_its_panel(page: 
     expect(use).to_have_attribute("aria-disabled", "true")
 
 
+@pytest.mark.long
 def test_the_camera_clocks_calibration_is_told_and_taken_from_the_panel(page: Page, server: PlayedServer) -> None:
     panel = page.locator("rp-calibration")
     use, rows = panel.locator("#use-timing"), panel.locator("[data-calibration^=timing]")
@@ -250,6 +253,7 @@ def test_the_arms_commands_in_time_are_told_of_a_real_robot_alone(page: Page, se
     expect(gauge.locator(".gauge-warning")).to_have_text("▾ low")
 
 
+@pytest.mark.long
 def test_processes_have_versions_and_a_different_one_is_told(page: Page, server: PlayedServer) -> None:
     open_screen(page, "engineer")
     row = page.locator('[data-panel="processes"] [data-process="bridge"]')
@@ -265,6 +269,7 @@ def test_processes_have_versions_and_a_different_one_is_told(page: Page, server:
     expect(row).to_have_attribute("data-present", "false")
 
 
+@pytest.mark.long
 def test_every_topic_has_its_rate_and_age_and_a_late_one_stands_out(page: Page, server: PlayedServer) -> None:
     open_screen(page, "engineer")
     rows = page.locator('[data-panel="topics"] tbody tr')

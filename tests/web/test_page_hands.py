@@ -141,6 +141,7 @@ def test_a_question_mark_in_a_text_field_is_text(page: Page) -> None:
     assert page.locator("#help").count() == 0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_settings_help_and_invitation_can_be_read_by_everybody(
     page: Page, server: PlayedServer, axe: str, scheme: Any

@@ -35,6 +35,7 @@ def codes(page: Page) -> list[str]:
     return page.locator("#alarms li").evaluate_all("rows => rows.map(row => row.dataset.code)")
 
 
+@pytest.mark.long
 def test_charts_show_what_was_and_stand_still_when_told_to(page: Page, server: PlayedServer) -> None:
     page.wait_for_timeout(1200)
     server.controller = controller("AUTO", position_error=0.0123)
@@ -141,6 +142,7 @@ def test_what_halts_the_work_comes_before_what_stands_as_long_as_the_program_run
     expect(page.locator("#more-alarms")).to_be_visible()
 
 
+@pytest.mark.long
 def test_a_camera_that_is_found_turned_is_told_and_its_correction_is_a_press_away(
     page: Page, server: PlayedServer
 ) -> None:
@@ -165,6 +167,7 @@ def test_every_limit_that_is_set_wider_than_usual_is_told(page: Page, server: Pl
         expect(page.locator('#alarms [data-code="limits_relaxed"] strong')).to_contain_text(reasons.text_of(each))
 
 
+@pytest.mark.long
 def test_without_a_link_that_is_the_one_alarm_until_it_is_back(page: Page, server: PlayedServer) -> None:
     server.gone = {"controller": 3.0}
     expect(page.locator('#alarms li[data-code="controller_gone"]')).to_be_visible()

@@ -115,6 +115,7 @@ def test_the_list_has_room_for_five_cuts(page: Page, server: PlayedServer) -> No
     assert fifth["y"] + fifth["height"] <= list_["y"] + list_["height"]
 
 
+@pytest.mark.long
 def test_the_log_follows_its_newest_line_when_the_screen_is_turned(page: Page, server: PlayedServer) -> None:
     def at_end() -> bool:
         past = "each => each.scrollHeight - each.scrollTop - each.clientHeight"

@@ -80,6 +80,7 @@ def test_where_no_point_can_be_the_page_says_why(page: Page, server: PlayedServe
     expect(page.locator("#add-by-hand")).to_be_disabled()
 
 
+@pytest.mark.long
 def test_a_frozen_image_stays_with_its_points_and_is_the_one_that_is_clicked(page: Page, server: PlayedServer) -> None:
     server.answers["/api/points/by-hand-in-image"] = PLACED
     expect(page.locator("rp-camera .mark")).to_have_count(3)

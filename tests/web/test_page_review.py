@@ -141,6 +141,7 @@ def test_a_picture_that_is_missing_is_told_asked_for_again_and_keeps_nobody_from
     looking_at(page, "p3")
 
 
+@pytest.mark.long
 def test_a_picture_of_an_older_cut_shows_no_cut(page: Page, server: DecidingServer) -> None:
     server.drawn_revisions["p3"] = 3
     looking_at(page, "p1")
@@ -194,6 +195,7 @@ def test_why_it_was_left_can_be_said_and_need_not(page: Page, server: DecidingSe
     assert len(server.posted) == 4
 
 
+@pytest.mark.long
 def test_everything_is_undone_step_by_step_and_is_looked_at_again(page: Page, server: DecidingServer) -> None:
     expect(page.locator("#undo")).to_be_disabled()
     looking_at(page, "p1")

@@ -145,6 +145,7 @@ def test_the_other_robot_is_seen_and_chosen_and_nothing_reaches_the_wrong_one(pa
     expect(second).to_be_visible()
 
 
+@pytest.mark.long
 def test_a_notice_of_another_robot_hides_none_of_them(pages: Page, hall: PlayedHall) -> None:
     page = pages
     hall.alarms["panda-2"] = reasons.robot_stopped(reasons.said("by Bob"))
@@ -156,6 +157,7 @@ def test_a_notice_of_another_robot_hides_none_of_them(pages: Page, hall: PlayedH
         assert toast["x"] >= 0 and toast["x"] + toast["width"] <= width
 
 
+@pytest.mark.long
 def test_the_picker_is_for_fingers_keys_and_those_who_do_not_see_it(pages: Page, hall: PlayedHall, axe: str) -> None:
     page, names = pages, list(hall.robots)
     hall.alarms["panda-2"] = reasons.robot_stopped(

@@ -240,6 +240,7 @@ def test_the_words_of_a_banner_have_room_on_every_screen(
             assert box_of(words)["width"] >= 150
 
 
+@pytest.mark.long
 def test_on_a_telephone_a_pause_hides_little_of_what_is_decided_until_it_is_unfolded(
     page: Page, server: PlayedServer
 ) -> None:
@@ -358,6 +359,7 @@ def test_on_a_tablet_all_that_can_be_done_to_a_cut_is_in_sight(page: Page, serve
             assert box_of(each)["y"] + box_of(each)["height"] <= strip["y"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("language", ["en", "de", "es"])
 def test_on_a_tablet_every_axis_of_the_tool_is_in_sight(page: Page, server: PlayedServer, language: str) -> None:
     page.set_viewport_size({"width": 1024, "height": 768})

@@ -64,6 +64,7 @@ def test_the_guide_names_buttons_as_the_page_does(language: str) -> None:
     assert named - set(texts(language).values()) == set()
 
 
+@pytest.mark.long
 @pytest.mark.browser
 def test_a_language_is_chosen_on_the_page_and_remembered(page: Page, server: PlayedServer) -> None:
     page.locator("#person").click()
@@ -82,6 +83,7 @@ def test_a_language_is_chosen_on_the_page_and_remembered(page: Page, server: Pla
     expect(page.locator("html")).to_have_attribute("lang", "en")
 
 
+@pytest.mark.long
 @pytest.mark.browser
 def test_numbers_and_reasons_are_in_the_language_of_the_browser(browser: Browser, server: PlayedServer) -> None:
     context = browser.new_context(locale="de-DE")

@@ -93,6 +93,7 @@ def test_one_press_accepts_the_sure_cuts_as_they_are_shown_and_another_leaves_th
     assert [server.state_of(name) for name in ("p3", "p4")] == ["PROPOSED", "PROPOSED"]
 
 
+@pytest.mark.long
 def test_all_is_taken_back_by_one_press_each_but_not_what_was_cut_since(page: Page, server: DecidingServer) -> None:
     looking_at(page, "p1")
     opened(page)
@@ -124,6 +125,7 @@ def test_what_is_accepted_can_be_taken_back_before_the_robot_tells_of_it(
     until(page, lambda: [server.state_of(name) for name in ("p1", "p2")] == ["PROPOSED"] * 2)
 
 
+@pytest.mark.long
 def test_what_is_taken_out_is_not_decided_about_and_comes_next(page: Page, server: DecidingServer) -> None:
     looking_at(page, "p1")
     opened(page)
@@ -167,6 +169,7 @@ def test_a_cut_that_changes_in_between_is_seen_anew_or_refused_with_its_reason(
     assert asked(server, "reconsider").keys() == {"p1"}
 
 
+@pytest.mark.long
 def test_a_press_right_after_a_cut_has_changed_does_not_accept_it(page: Page, server: DecidingServer) -> None:
     looking_at(page, "p1")
     opened(page)
@@ -203,6 +206,7 @@ def test_only_what_was_in_sight_is_accepted(page: Page, server: DecidingServer) 
     assert asked(server, "accept").keys() == {row.point.point_id for row in server.points}
 
 
+@pytest.mark.long
 def test_a_cut_without_a_picture_is_not_accepted_with_the_others(page: Page, server: DecidingServer) -> None:
     looking_at(page, "p1")
     server.crop = b""
@@ -240,6 +244,7 @@ def test_keys_and_the_large_picture(page: Page, server: DecidingServer) -> None:
     expect(page.locator("rp-vine-sheet h2")).to_have_text("Vine 2")
 
 
+@pytest.mark.long
 def test_a_viewer_sees_the_vine_and_decides_nothing(page: Page, server: DecidingServer) -> None:
     server.role = "viewer"
     page.reload()
