@@ -5,6 +5,7 @@ position on the cane from half the distance of the survey and confirms the last 
 After a cut it tells whether the wood beyond is gone. It never proposes a cut.
 """
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -34,6 +35,8 @@ AROUND = 0.07
 _OWN = 0.02
 #: Farthest that a cane sways aside (m), and how near to a place along it a line must come to pass it (m).
 _SWAYS, _PAST = 0.03, 0.005
+#: Another line, and another cane of the map, are farther from a cane that is taken for the point's than it is (m).
+_ALONE = 0.01
 
 
 class CloseUp(NamedTuple):
@@ -129,6 +132,10 @@ def check_close_up(
     labels = segmenter.segment(part)
     lines = trace_canes(part, labels, config.skeleton)
     shift = picture_shift(known, lines, accepted, along, expected)
+    # What the cane's last kept node cannot confirm is not looked for aside.
+    if point.offset is not None and (shift is None or _cane_at(accepted + shift.by, along, lines, limits) is None):
+        aside = _lone_cane(position, along, lines, known, expected, limits)
+        shift = shift if aside is None else PictureShift(expected + aside)
     by = expected if shift is None else shift.by
     position = accepted + by
     probe = position + limits.probe_distance * along
@@ -184,18 +191,62 @@ def _may_stand_aside(
         shift: Of the picture; None where nobody knows it, so that any line may be the cane.
         limits: Which lines count.
     """
-    axes = () if shift is None else tuple(axis + shift.by for axis in known.axes)
-    neighbours = [axis for axis in axes if float(np.min(np.linalg.norm(axis - probe, axis=1))) > _OWN]
+    neighbours = [] if shift is None else _axes(known, shift.by, probe)[1]
+    return any(
+        math.dist(at, probe) < _SWAYS and all(_away(axis, at) > _OWN / 2 for axis in neighbours)
+        for at in _passing(lines, probe, along, limits)
+    )
+
+
+def _lone_cane(
+    place: Array, along: Array, lines: list[Centreline], known: Surroundings, expected: Array, limits: CloseUpConfig
+) -> Array | None:
+    """How far aside of its place (3, m) the picture shows a cane, where no other one can be it; None otherwise.
+
+    Canes sway one by one, and depth is lost in patches, so that the surroundings of a point may not fit the map.
+
+    Args:
+        place: Where the cane is expected (3, m, odom).
+        along: Unit vector along the cane (3, odom).
+        lines: Canes that the picture shows.
+        known: Canes around the point, its own among them.
+        expected: Shift of the picture against the map (3, m, odom).
+        limits: Which lines count.
+    """
+    passing = _passing(lines, place, along, limits)
+    away = [math.dist(at, place) for at in passing]
+    own, neighbours = _axes(known, expected, place)
+    if not own or not passing or away[0] > _SWAYS or (len(away) > 1 and away[1] < away[0] + _ALONE):
+        return None
+    nearest = min(_away(axis, passing[0]) for axis in own)
+    if any(_away(axis, passing[0]) < nearest + _ALONE for axis in neighbours):
+        return None
+    off = passing[0] - place
+    aside: Array = off - along * float(off @ along)
+    return aside
+
+
+def _passing(lines: list[Centreline], place: Array, along: Array, limits: CloseUpConfig) -> list[Array]:
+    """Where lines in the direction of a cane pass a place on it (3, m, odom), the nearest first."""
+    found = []
     for line in lines:
-        away = np.linalg.norm(line.axis - probe, axis=1)
+        away = np.linalg.norm(line.axis - place, axis=1)
         k = int(np.argmin(away))
         chord = line.axis[min(k + 1, len(away) - 1)] - line.axis[max(k - 1, 0)]
-        passes = abs(float((line.axis[k] - probe) @ along)) < _PAST and float(away[k]) < _SWAYS
-        if not passes or abs(float(chord @ along)) < limits.min_alignment * float(np.linalg.norm(chord)):
-            continue
-        if all(float(np.min(np.linalg.norm(axis - line.axis[k], axis=1))) > _OWN / 2 for axis in neighbours):
-            return True
-    return False
+        aligned = abs(float(chord @ along)) >= limits.min_alignment * float(np.linalg.norm(chord))
+        if aligned and abs(float((line.axis[k] - place) @ along)) < _PAST:
+            found.append((float(away[k]), line.axis[k]))
+    return [at for _, at in sorted(found, key=lambda each: each[0])]
+
+
+def _axes(known: Surroundings, shift: Array, place: Array) -> tuple[list[Array], list[Array]]:
+    """Known axes in a picture with this shift: those that may be of the cane at a place, and its neighbours'."""
+    axes = [axis + shift for axis in known.axes]
+    return [each for each in axes if _away(each, place) <= _OWN], [each for each in axes if _away(each, place) > _OWN]
+
+
+def _away(axis: Array, place: Array) -> float:
+    return float(np.min(np.linalg.norm(axis - place, axis=1)))
 
 
 def failed_check(frame: CameraFrame, reason: Reason) -> CloseUpResult:

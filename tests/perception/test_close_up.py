@@ -173,18 +173,49 @@ def test_a_cane_that_sways_aside_is_not_taken_for_one_that_is_cut(scene: Scene) 
     findings = []
     for cut in scene.cuts:
         known = surroundings(scene.row, cut.best)
-        rod = scene.row.rods[cut.rod]
-        assert rod is not None
-        push = 0.022 * np.cross(cut.tangent, [0.0, 1.0, 0.0])
-        rods = [
-            replace(each, start=each.start + push, end=each.end + push)
-            if each is not None and (each.vine, each.spur, each.cane) == (rod.vine, rod.spur, rod.cane)
-            else each
-            for each in scene.row.rods
-        ]
-        swaying = Row(tuple(rods), scene.row.revision, scene.row.backdrop)
-        findings.append(look(view_from_clear(swaying, cut), point(cut), known).finding)
+        findings.append(look(view_from_clear(swaying(scene.row, cut, 0.022), cut), point(cut), known).finding)
     assert "severed" not in findings and findings.count("seen") >= len(findings) / 2
+
+
+def across(cut: RightCut) -> np.ndarray:
+    """Across the cane, along the row."""
+    return np.cross(cut.tangent, [0.0, 1.0, 0.0])
+
+
+def swaying(row: Row, cut: RightCut, aside: float) -> Row:
+    """The row with the cane of a cut aside (m)."""
+    chosen, push = row.rods[cut.rod], aside * across(cut)
+    assert chosen is not None
+    rods = [
+        replace(each, start=each.start + push, end=each.end + push)
+        if each is not None and (each.vine, each.spur, each.cane) == (chosen.vine, chosen.spur, chosen.cane)
+        else each
+        for each in row.rods
+    ]
+    return Row(tuple(rods), row.revision, row.backdrop)
+
+
+def among(cut: RightCut, *aside: float) -> Surroundings:
+    """A map of the cane of a cut and of others beside it (m), of which a picture in a storm may show none."""
+    axis = cut.best + np.linspace(-0.06, 0.06, 25)[:, None] * cut.tangent
+    return Surroundings(tuple(axis + each * across(cut) for each in (0.0, *aside)), np.zeros((0, 3)))
+
+
+def test_a_cane_that_sways_is_found_by_itself_where_no_other_one_can_be_it(scene: Scene) -> None:
+    places = []
+    for cut in scene.cuts:
+        seen = look(view_from_clear(swaying(scene.row, cut, 0.016), cut), point(cut), among(cut, -0.05, 0.05))
+        if seen.position is not None:
+            off = np.array(seen.position) - cut.best - 0.016 * across(cut)
+            places.append(float(np.linalg.norm(off - cut.tangent * (off @ cut.tangent))))
+    assert len(places) >= 0.7 * len(scene.cuts) and max(places) < 0.004
+
+
+def test_a_neighbour_that_sways_to_where_a_cane_was_is_not_taken_for_it(scene: Scene) -> None:
+    """What stands there is nearer to the place of the neighbour, 28 mm aside."""
+    for cut in scene.cuts:
+        seen = look(view_from_clear(swaying(scene.row, cut, 0.016), cut), point(cut), among(cut, -0.05, 0.028, 0.06))
+        assert seen.position is None, seen
 
 
 def test_a_cane_whose_depth_is_lost_beyond_the_cut_is_not_taken_for_one_that_is_cut(scene: Scene) -> None:
