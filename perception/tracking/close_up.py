@@ -191,7 +191,8 @@ def _may_stand_aside(
         shift: Of the picture; None where nobody knows it, so that any line may be the cane.
         limits: Which lines count.
     """
-    neighbours = [] if shift is None else _axes(known, shift.by, probe)[1]
+    axes = [] if shift is None else [axis + shift.by for axis in known.axes]
+    neighbours = [axis for axis in axes if _away(axis, probe) > _OWN]
     return any(
         math.dist(at, probe) < _SWAYS and all(_away(axis, at) > _OWN / 2 for axis in neighbours)
         for at in _passing(lines, probe, along, limits)
@@ -215,11 +216,16 @@ def _lone_cane(
     """
     passing = _passing(lines, place, along, limits)
     away = [math.dist(at, place) for at in passing]
-    own, neighbours = _axes(known, expected, place)
-    if not own or not passing or away[0] > _SWAYS or (len(away) > 1 and away[1] < away[0] + _ALONE):
+    # The map may have the cane more than once.
+    axes = sorted((axis + expected for axis in known.axes), key=lambda axis: _away(axis, place))
+    count = max(1, sum(_away(axis, place) <= _OWN for axis in axes))
+    if not axes or not passing or max(_away(axes[0], place), away[0]) > _SWAYS:
         return None
-    nearest = min(_away(axis, passing[0]) for axis in own)
-    if any(_away(axis, passing[0]) < nearest + _ALONE for axis in neighbours):
+    # Neither another line nor another cane of the map may come into question.
+    own = min(_away(axis, passing[0]) for axis in axes[:count])
+    if any(each < away[0] + _ALONE for each in away[1:]):
+        return None
+    if any(_away(axis, passing[0]) < own + _ALONE for axis in axes[count:]):
         return None
     off = passing[0] - place
     aside: Array = off - along * float(off @ along)
@@ -237,12 +243,6 @@ def _passing(lines: list[Centreline], place: Array, along: Array, limits: CloseU
         if aligned and abs(float((line.axis[k] - place) @ along)) < _PAST:
             found.append((float(away[k]), line.axis[k]))
     return [at for _, at in sorted(found, key=lambda each: each[0])]
-
-
-def _axes(known: Surroundings, shift: Array, place: Array) -> tuple[list[Array], list[Array]]:
-    """Known axes in a picture with this shift: those that may be of the cane at a place, and its neighbours'."""
-    axes = [axis + shift for axis in known.axes]
-    return [each for each in axes if _away(each, place) <= _OWN], [each for each in axes if _away(each, place) > _OWN]
 
 
 def _away(axis: Array, place: Array) -> float:
