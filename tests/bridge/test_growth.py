@@ -75,6 +75,7 @@ def test_the_same_seed_gives_the_same_growth_and_a_longer_row_begins_like_a_shor
     assert near[0] == near[1]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("knob", ORGANS)
 def test_as_many_nodes_carry_something_as_the_share_says_whatever_else_grows(knob: str) -> None:
     row = grow(VineyardConfig(), 5)

@@ -60,6 +60,7 @@ def cut_at(monkeypatch, size, tells=True):
     return r.true_tool(), r
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("size", [0.0, 0.03, -0.03])
 def test_the_blades_close_where_the_cane_is_and_nothing_jumps(monkeypatch, size):
     tool, r = cut_at(monkeypatch, size)

@@ -75,6 +75,7 @@ def test_a_goal_out_of_reach_is_approached_as_far_as_the_arm_goes_and_left_again
     assert recovers(r, start) > 0.0
 
 
+@pytest.mark.long
 def test_a_goal_through_the_axle_neither_folds_the_arm_into_the_base_nor_runs_away() -> None:
     r = armed()
     start = tool(r)
@@ -85,6 +86,7 @@ def test_a_goal_through_the_axle_neither_folds_the_arm_into_the_base_nor_runs_aw
     assert recovers(r, start) > 0.0
 
 
+@pytest.mark.long
 def test_a_goal_behind_the_base_is_reached_by_driving_back() -> None:
     r = armed()
     start = tool(r)
@@ -94,6 +96,7 @@ def test_a_goal_behind_the_base_is_reached_by_driving_back() -> None:
     assert recovers(r, start) > 0.0
 
 
+@pytest.mark.long
 def test_a_post_in_between_is_not_met_and_the_tool_comes_back() -> None:
     r = armed()
     start = tool(r)

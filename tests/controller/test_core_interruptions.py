@@ -124,6 +124,7 @@ def without_pictures(r, seconds):
     return np.array(r.record[before:])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("phase", "after_s"), [("APPROACH", 0.5), ("ADVANCE", 1.0), ("CUT", 0.1), ("RETREAT", 0.1)])
 def test_without_a_new_picture_the_robot_stands_and_goes_on_by_itself(phase, after_s):
     shown = point("p0", (0.2, 0.75, 1.05)), point("p1", (0.9, 0.75, 1.05))

@@ -92,6 +92,7 @@ def test_accepted_points_are_planned_and_what_the_plan_says_is_told() -> None:
     assert entry(p.robot, "high").user == "ada", "who accepted it stays known"
 
 
+@pytest.mark.long
 def test_points_accepted_one_after_the_other_are_planned_once_and_a_late_one_again() -> None:
     p = Planned(tuple(point(name, (x, 0.75, 1.05)) for name, x in (("a", 0.3), ("b", 0.6), ("c", 0.9))))
     p.accepted("a")
@@ -120,6 +121,7 @@ def test_work_follows_the_plan_to_its_stands_and_in_its_order() -> None:
     assert np.hypot(p.robot.q[0] - last.x, p.robot.q[1] - last.y) < 0.05
 
 
+@pytest.mark.long
 def test_later_cuts_are_rolled_out_during_the_work_and_the_plan_stays_valid(monkeypatch) -> None:
     monkeypatch.setattr(cuts, "AHEAD", 2)
     monkeypatch.setattr(plan_manager, "_NEXT", 2)
@@ -164,6 +166,7 @@ def test_the_work_does_not_end_before_a_plan_from_the_last_cut_has_refused_what_
     assert entry(p.robot, "in").state == "DONE" and p.robot.state.reason == reasons.work_done()
 
 
+@pytest.mark.long
 def test_a_planner_that_does_not_answer_does_not_keep_the_work_from_ending() -> None:
     p = Planned((point("in", (0.5, 0.75, 1.05)), point("good", (1.4, 0.75, 1.05))), obstacles=(POST,))
     p.accepted("in", "good").until_valid()
@@ -186,6 +189,7 @@ def test_where_nothing_accepted_can_be_reached_no_work_begins_and_that_is_said()
     assert p.robot.ask(intents.Start(user="ada")).reason == reasons.none_accepted()
 
 
+@pytest.mark.long
 def test_what_could_not_be_reached_is_accepted_again_once_a_plan_can() -> None:
     p = Planned((point("in", (0.5, 0.75, 1.05)), point("good", (1.4, 0.75, 1.05))), obstacles=(POST,))
     first = p.accepted("in", "good").until_valid()

@@ -207,6 +207,7 @@ def test_a_point_that_the_close_up_shows_changed_is_not_cut_says_why_and_the_wor
     assert entry(r, "b").state == "DONE"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("finding", ["unseen", "severed", "changed"])
 @pytest.mark.parametrize("hidden", [1, 2, 9])
 def test_what_close_ups_do_not_show_is_looked_at_from_other_sides_and_then_left(hidden, finding):

@@ -34,6 +34,7 @@ def request(*points, obstacles=(), number=1):
     return PlanRequest(number, q, points, obstacles)
 
 
+@pytest.mark.long
 def test_cuts_come_in_the_order_along_the_row_as_they_will_be_driven() -> None:
     asked = request(point("far", 1.6), point("near", 0.2), point("middle", 0.9))
     plan = PLANNER.plan(asked)
@@ -58,6 +59,7 @@ def test_later_cuts_are_rolled_out_later(monkeypatch) -> None:
     assert plan.duration == pytest.approx(1.5 * middle.ends_s)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("beside", "order"), [(0.02, ["stub", "cut"]), (0.1, ["cut", "stub"])])
 def test_a_stub_goes_first_where_the_blades_would_push_a_cane_beside_the_cut_above_it(beside, order) -> None:
     """Such a cane often goes with the stub. The cut comes first on the way along the row."""
@@ -76,6 +78,7 @@ def test_people_set_the_order() -> None:
     assert [cut.point.point_id for cut in plan.cuts] == ["c", "a", "b"]
 
 
+@pytest.mark.long
 def test_what_the_rollout_does_not_cut_is_refused_and_the_others_are_rolled_out_without_it() -> None:
     """A bar between the two, at the height of the arm; where the cuts are made there is room."""
     bar = Capsule("wire", (1.2, 0.3, 1.0), (1.2, 0.9, 1.0), 0.004, 0.004)
@@ -120,6 +123,7 @@ def test_the_same_request_has_the_same_hash_whoever_answers_it() -> None:
     assert [cut.rollout for cut in first.cuts] == [cut.rollout for cut in other.cuts]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("what", ["place", "revision", "position", "obstacles", "points", "speed"])
 def test_the_hash_changes_when_anything_does(what) -> None:
     asked = request(point("a", 0.3), obstacles=(POST,))

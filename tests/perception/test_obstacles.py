@@ -37,6 +37,7 @@ def seen(request):
     return row, capsules
 
 
+@pytest.mark.long
 def test_every_rod_found_lies_on_one_of_its_kind(seen):
     row, capsules = seen
     assert {"wire", "cordon", "trunk"} <= {capsule.kind for capsule in capsules}

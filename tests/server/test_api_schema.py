@@ -75,6 +75,7 @@ def test_nothing_that_is_sent_makes_the_server_fail(server, operations, examples
             tried(operation, check, examples)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("examples", [3, pytest.param(100, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("who", ["visitor", "foreign page", "viewer"])
 def test_nothing_is_done_for_who_may_not(server, operations, who, examples):

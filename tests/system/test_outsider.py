@@ -145,6 +145,7 @@ def test_whoever_has_no_certificate_of_this_run_reads_nothing_and_moves_nothing(
     assert not [event for event in trace.events if event["event"] == "cut"]
 
 
+@pytest.mark.long
 def test_a_bare_connection_is_told_nothing(demo: TracedDemo) -> None:
     """The bytes that come back are those of TLS's own refusal, at most."""
     with socket.create_connection(("127.0.0.1", port_of(demo)), timeout=5) as plain:
@@ -165,6 +166,7 @@ def test_a_bare_connection_is_told_nothing(demo: TracedDemo) -> None:
         raise ConnectionError("closed without a word")
 
 
+@pytest.mark.long
 def test_the_keys_of_the_run_are_for_this_user_alone(demo: TracedDemo) -> None:
     (folder,) = demo.trace.parent.glob("rolling-panda-*/certificates")
     assert folder.stat().st_mode & 0o777 == 0o700 and folder.stat().st_uid == os.getuid()

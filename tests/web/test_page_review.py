@@ -360,6 +360,7 @@ def test_thirty_four_cuts_take_thirty_four_presses_and_forty_seconds_at_a_second
 # --- places ----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_a_place_to_decide_has_its_picture_its_reasons_and_a_cut_where_it_is_tapped(
     page: Page, server: DecidingServer
 ) -> None:

@@ -178,6 +178,7 @@ def test_a_joint_turns_while_its_button_is_held_and_its_range_is_drawn(page: Pag
         assert min(box["width"], box["height"]) >= 44
 
 
+@pytest.mark.long
 def test_the_next_joint_turns_for_as_long_as_its_button_is_held_too(page: Page, server: PlayedServer) -> None:
     begin(page, "Joints")
     for name, joint in (("Joint 1 up", 1), ("Joint 4 up", 4)):

@@ -46,6 +46,7 @@ def test_apostrophes_and_spaces_are_those_of_the_language(language: str, wrong: 
     assert {key: text for key, text in texts(language).items() if re.search(wrong, text)} == {}
 
 
+@pytest.mark.long
 @pytest.mark.browser
 @pytest.mark.parametrize("language", OTHERS)
 def test_each_counted_text_has_the_plural_forms_that_browsers_ask_for(page: Page, language: str) -> None:
