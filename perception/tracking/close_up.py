@@ -35,7 +35,7 @@ AROUND = 0.07
 _OWN = 0.02
 #: Farthest that a cane sways aside (m), and how near to a place along it a line must come to pass it (m).
 _SWAYS, _PAST = 0.03, 0.005
-#: Another line, and another cane of the map, are farther from a cane that is taken for the point's than it is (m).
+#: A cane is taken for the point's by itself where any other is farther away by this (m).
 _ALONE = 0.01
 
 
@@ -216,16 +216,14 @@ def _lone_cane(
     """
     passing = _passing(lines, place, along, limits)
     away = [math.dist(at, place) for at in passing]
-    # The map may have the cane more than once.
     axes = sorted((axis + expected for axis in known.axes), key=lambda axis: _away(axis, place))
-    count = max(1, sum(_away(axis, place) <= _OWN for axis in axes))
     if not axes or not passing or max(_away(axes[0], place), away[0]) > _SWAYS:
         return None
-    # Neither another line nor another cane of the map may come into question.
-    own = min(_away(axis, passing[0]) for axis in axes[:count])
-    if any(each < away[0] + _ALONE for each in away[1:]):
-        return None
-    if any(_away(axis, passing[0]) < own + _ALONE for axis in axes[count:]):
+    # The map may have a cane that sways more than once.
+    own = [axis for axis in axes if _away(axis, place) <= _OWN] or axes[:1]
+    nearest = min(_away(axis, passing[0]) for axis in own)
+    other_line = any(each < away[0] + _ALONE for each in away[1:])
+    if other_line or any(_away(axis, passing[0]) < nearest + _ALONE for axis in axes[len(own) :]):
         return None
     off = passing[0] - place
     aside: Array = off - along * float(off @ along)
