@@ -137,8 +137,8 @@ class MotionConfig(Struct, frozen=True, forbid_unknown_fields=True):
     """
 
     tool_turn: Annotated[float, at_most(2.5)] = 1.5
-    tool_acceleration: Annotated[float, at_most(10.0)] = 3.0
-    tool_jerk: Annotated[float, at_most(500.0)] = 50.0
+    tool_acceleration: Annotated[float, at_most(10.0)] = 2.0
+    tool_jerk: Annotated[float, at_most(500.0)] = 20.0
     cut_speed: Annotated[float, at_most(0.1)] = 0.05
     slow_zone: Annotated[float, at_least(0.01, 0.2)] = 0.025
     slow_braking: Annotated[float, at_most(3.0)] = 1.2

@@ -26,6 +26,8 @@ class RuleConfig(Struct, frozen=True, forbid_unknown_fields=True):
         hidden_node_distance: A hidden stretch at least this far from every seen node may hide a node (m).
         diameter_error: Standard error of a diameter from one frame (m). A choice that turns on less is undecided.
         max_averaged: The error falls with the root of the number of frames, up to this number.
+        shared_diameter_error: Standard error of a diameter that all frames of a cane share (m). A cut is less sure, and
+            says so, where the choice of its cane turns on less.
         min_node_distance: Nodes closer than this past the basal bud may belong to two canes (m).
         min_internode: The same for two kept nodes (m).
         max_internode: Between kept nodes farther apart than this a node was missed (m).
@@ -62,6 +64,7 @@ class RuleConfig(Struct, frozen=True, forbid_unknown_fields=True):
     hidden_node_distance: Positive = 0.035
     diameter_error: Positive = 0.00035
     max_averaged: Annotated[int, Meta(ge=1, le=100)] = 9
+    shared_diameter_error: Positive = 0.00036
     min_node_distance: Positive = 0.03
     min_internode: Positive = 0.05
     max_internode: Positive = 0.125

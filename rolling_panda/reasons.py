@@ -1626,6 +1626,11 @@ def renewal_cut(others: float) -> None:
     """Renewal cut: the old stub falls with {others:.0f} other {others:cane|canes}, just past the cane that stays."""
 
 
+@_reason("info", "look which cane should stay")
+def close_choice(cut: Reason, difference_mm: float) -> None:
+    """{cut}; with {difference_mm:.1f} mm more or less in thickness another cane would stay."""
+
+
 @_reason("info", "")
 def placed_past_node(user: str, distance_mm: float, node: float) -> None:
     """Placed by {user}: {distance_mm:.0f} mm past bud {node:.0f} on this cane."""
@@ -2802,6 +2807,11 @@ def cane_met(part: str, other: str, force_n: float) -> None:
 @_reason("warning", "")
 def missed_once(why: Reason) -> None:
     """{why}. The cut is tried again another way."""
+
+
+@_reason("warning", "")
+def not_seen_once(why: Reason) -> None:
+    """{why}. The cut is tried again."""
 
 
 @_reason("warning", "")

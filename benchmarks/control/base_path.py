@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.control.plan_limits import PlanLimits
-from benchmarks.control.rest_to_rest import Profile, durations, quickest
+from controller.motion.rest_to_rest import Profile, durations, quickest
 from rolling_panda.model.differential_drive import Array, DifferentialDrive
 
 _NEAR, _ITERATIONS, _NUDGE = 1e-11, 12, 1e-6

@@ -16,8 +16,7 @@ from benchmarks.control.arm_ik import ArmIk, wrapped
 from benchmarks.control.base_path import BasePlanner
 from benchmarks.control.path import PathPlanner, Planned, Refused, Stand
 from benchmarks.control.plan_limits import PlanLimits
-from benchmarks.control.rest_to_rest import durations
-from controller.motion.tool_motion import Rates
+from controller.motion.rest_to_rest import Rates, durations
 from controller.whole_body.collision import CollisionModel
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import ARM_Q, RobotModel

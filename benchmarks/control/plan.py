@@ -9,7 +9,7 @@ import numpy as np
 from benchmarks.control.arm_path import ArmPath
 from benchmarks.control.base_path import BaseMotion
 from benchmarks.control.plan_limits import PlanLimits
-from benchmarks.control.rest_to_rest import quickest
+from controller.motion.rest_to_rest import quickest
 from rolling_panda.model.differential_drive import NQ, NXI, Array
 from rolling_panda.model.robot import ARM_Q, ARM_XI, RobotModel
 

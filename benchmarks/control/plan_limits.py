@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller.motion.tool_motion import Rates
+from controller.motion.rest_to_rest import Rates
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import ARM_Q, ARM_XI, RobotModel
 

@@ -19,7 +19,8 @@ from benchmarks.peers.predictive import Predictive
 from benchmarks.peers.reactive import REACTIVE, Aimed, reactive
 from controller.config import ControllerConfig, HierarchyConfig, MotionConfig, WholeBodyConfig, WorkConfig
 from controller.motion.follower import tool_error
-from controller.motion.tool_motion import PoseTrajectory, Rates
+from controller.motion.rest_to_rest import Rates
+from controller.motion.tool_motion import PoseTrajectory
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.registry import make_method
 from controller.whole_body.task import IkProblem, Method, Posture, Solution, ToolTask

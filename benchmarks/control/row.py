@@ -124,7 +124,7 @@ def cut_row(
         with ClosedLoop(seed, path, config, method, watch, plans, looks, segmenter) as loop:
             row = row_of(loop)
             touches, wanted = CaneTouches(staying_rods(row)), wanted_cuts(row)
-            warned = _check_camera(loop) if checked else ""
+            warned = check_camera(loop) if checked else ""
             accepted = [] if along else _accept(loop, points)
             blocked = _blocked(loop, accepted, row, wanted)
             begin, other_s, person = loop.now, 0.0, Supervisor(path)
@@ -295,7 +295,7 @@ def named(touched: dict[Cane, set[str]]) -> dict[str, str]:
     }
 
 
-def _check_camera(loop: ClosedLoop) -> str:
+def check_camera(loop: ClosedLoop) -> str:
     """Check the camera, use what corrections are offered, and check again; returns the first warning, empty without."""
     warned = ""
     loop.run(1.0)

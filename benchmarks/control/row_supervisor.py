@@ -10,9 +10,9 @@ from tests.support.worlds.closed_loop import ClosedLoop
 #: Who has control of the robot.
 USER = "bench"
 #: A person takes so long to come, to look and to press (s). Estimate.
-_LOOK_S = 20.0
+LOOK_S = 20.0
 #: After that a stop whose cause is not gone is given up (s).
-_GONE_S = 5.0
+GONE_S = 5.0
 #: Times that a person lets one row go on.
 _MOST = 4
 
@@ -40,7 +40,7 @@ class Supervisor:
         if loop.controller.mode not in ("PROTECTIVE_STOP", "PAUSED") or self.cleared >= _MOST:
             return False
         begin = loop.now
-        loop.run(_LOOK_S)
+        loop.run(LOOK_S)
         goes_on = self._press(loop)
         self.waited_s += loop.now - begin
         self.cleared += goes_on
@@ -48,7 +48,7 @@ class Supervisor:
 
     def _press(self, loop: ClosedLoop) -> bool:
         if loop.controller.mode == "PROTECTIVE_STOP":
-            loop.run_until(lambda: loop.command(intents.Acknowledge(user=USER)).ok, _GONE_S)
+            loop.run_until(lambda: loop.command(intents.Acknowledge(user=USER)).ok, GONE_S)
             loop.run(0.1)
         for entry in loop.queue("UNKNOWN"):
             outcome = self._seen(entry.point_id)

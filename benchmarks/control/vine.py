@@ -22,17 +22,19 @@ from benchmarks.common.documents import bench_parser, write
 from benchmarks.common.intervals import Figure, quantile, share
 from benchmarks.control.cane_touches import CaneTouches
 from benchmarks.control.cut_truth import WantedCut, true_cut, wanted_cuts
-from benchmarks.control.row import codes, judged_cuts, named, row_of, sim_config
+from benchmarks.control.row import check_camera, codes, judged_cuts, named, row_of, sim_config
 from benchmarks.control.row_report import Cut
 from benchmarks.control.row_stages import STAGES, StageClock
+from benchmarks.control.row_supervisor import GONE_S, LOOK_S
 from benchmarks.control.row_walk import USER, go_on, place
+from benchmarks.control.world import calibrated
 from benchmarks.perception.blocked import Blocker, blocked_by
 from benchmarks.perception.judge import nearest_rod
 from bridge.sim.robot import trace
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.row import Row
 from bridge.sim.vineyard.truth import staying_rods
-from bridge.sim.world.config import PRESETS
+from bridge.sim.world.config import PRESETS, WorldConfig
 from controller.config import ControllerConfig
 from controller.motion.follower import Tracking
 from perception.segmentation.segmenter import SEGMENTERS
@@ -68,6 +70,8 @@ _PLAN_S = 5.0
 _ACCEPTED_AT_MOST, _ROUNDS = 2, 3
 #: Whoever decides more often than this goes in circles.
 _DECISIONS_AT_MOST = 200
+#: Protective stops in one vine after which a person lets the work go on.
+_STOPS_AT_MOST = 4
 #: The robot has left when it is nearer to the vine's end than this (m).
 _ARRIVED = 0.05
 #: Longest survey, and work for each accepted point with what does not depend on them (s).
@@ -123,6 +127,7 @@ class VineRun:
         wall_s: Real time of the run (s).
         glance_s: Look at one of several pictures (s).
         glances: Such looks.
+        stops: Protective stops after which a person let the work go on.
     """
 
     seed: int
@@ -143,6 +148,7 @@ class VineRun:
     wall_s: float
     glance_s: float = GLANCE_S
     glances: int = 0
+    stops: int = 0
 
     @property
     def key(self) -> tuple[object, ...]:
@@ -179,6 +185,7 @@ class Reviewer:
         points: Every point that was proposed, as it was last seen.
         accepted: Entries of the accepted points, as they were accepted.
         refusals: Codes of refused acceptances, by point.
+        left: Undecided places as they were when they were left; a cut beside one changes its reason.
     """
 
     loop: ClosedLoop
@@ -190,8 +197,8 @@ class Reviewer:
     points: dict[str, m.PruningPoint] = field(default_factory=dict)
     accepted: dict[str, m.QueueEntry] = field(default_factory=dict)
     refusals: dict[str, str] = field(default_factory=dict)
+    left: list[m.UndecidedSite] = field(default_factory=list)
     _asked: Counter[str] = field(default_factory=Counter)
-    _left: set[tuple[int, int]] = field(default_factory=set)
 
     def decide(self) -> None:
         """Decide about everything that is open, one item after the other along the row."""
@@ -265,7 +272,7 @@ class Reviewer:
         self.accepted |= {entry.point_id: entry for entry in self.loop.queue("ACCEPTED", "UNREACHABLE")}
 
     def _leave(self, vine: int, spur: int) -> None:
-        self._left.add((vine, spur))
+        self.left += [site for site in self._sites() if (site.vine, site.spur) == (vine, spur)]
         self.loop.perception.answer(intents.LeaveSite(user=USER, vine=vine, spur=spur))
 
     def look_at_unknown(self, row: Row) -> None:
@@ -297,13 +304,17 @@ class Reviewer:
 
     def _places(self) -> dict[tuple[int, int], bool]:
         """Undecided places that are still to be left, and whether each can wait for another look."""
-        shown = self.loop.inbox.newest(m.PruningPoints)
         found: dict[tuple[int, int], bool] = {}
-        for site in () if shown is None else shown.message.undecided_sites:
+        left = {(site.vine, site.spur) for site in self.left}
+        for site in self._sites():
             place = site.vine, site.spur
-            if site.vine > 0 and site.needs != "nothing" and place not in self._left:
+            if site.vine > 0 and site.needs != "nothing" and place not in left:
                 found[place] = found.get(place, True) and site.needs != "operator"
         return found
+
+    def _sites(self) -> tuple[m.UndecidedSite, ...]:
+        shown = self.loop.inbox.newest(m.PruningPoints)
+        return () if shown is None else shown.message.undecided_sites
 
     def _next(self, last: tuple[int, int, bool, str]) -> tuple[int, int, bool, str] | None:
         """The page's next item after one: vine, spur, whether it is a place without a point, and its point."""
@@ -347,6 +358,7 @@ class Visit:
         reviewer: Who decides.
         stages: Seconds by stage, without those of the work.
         clock: Seconds of the work by stage.
+        stops: Protective stops after which the work went on.
     """
 
     def __init__(self, loop: ClosedLoop, reviewer: Reviewer, clock: StageClock, length: float) -> None:
@@ -354,6 +366,7 @@ class Visit:
         self.reviewer, self.clock = reviewer, clock
         self.stages = dict.fromkeys(VINE_STAGES, 0.0)
         self._loop, self._length = loop, length
+        self.stops = 0
         self._since = 0.0
         self._works = False
 
@@ -381,7 +394,7 @@ class Visit:
                 break
             loop.run_until(lambda: _planned(loop), _PLAN_S)
             self._spent("plan")
-            self._work()
+            self.work()
             if loop.controller.mode != "READY":
                 break
         mode = loop.controller.mode
@@ -396,7 +409,7 @@ class Visit:
         self.stages[stage] += self._loop.now - self._since
         self._since = self._loop.now
 
-    def _work(self) -> None:
+    def work(self) -> None:
         """Work until nothing is left, with a person who looks at what is unknown and goes on."""
         loop, clock = self._loop, self.clock
         limit = loop.now + _WORK_LIMIT_S + _POINT_LIMIT_S * sum(1 for _ in loop.queue("ACCEPTED"))
@@ -406,13 +419,24 @@ class Visit:
             loop.run_until(lambda: loop.controller.mode != "AUTO", limit - loop.now)
             clock.end(loop.now)
             self._works, self._since = False, loop.now
+            if loop.controller.mode == "PROTECTIVE_STOP" and self.stops < _STOPS_AT_MOST:
+                self._acknowledge()
             if loop.controller.mode != "PAUSED":
                 break
             self.reviewer.look_at_unknown(row_of(loop))
             loop.command(intents.Resume(user=USER))
             loop.run(0.1)
+            limit += loop.now - self._since
             self._spent("decisions")
         self._since = loop.now
+
+    def _acknowledge(self) -> None:
+        """A person comes, looks, and acknowledges once the cause is gone."""
+        loop = self._loop
+        loop.run(LOOK_S)
+        loop.run_until(lambda: loop.command(intents.Acknowledge(user=USER)).ok, GONE_S)
+        loop.run(0.1)
+        self.stops += loop.controller.mode == "PAUSED"
 
 
 def prune_vine(
@@ -426,6 +450,8 @@ def prune_vine(
     glance_s: float = GLANCE_S,
 ) -> VineRun:
     """Arrive, survey, decide, cut, leave, and judge.
+
+    Into a rough world the robot comes calibrated and with its camera checked, and it estimates its place in the row.
 
     Args:
         seed: Of vine, camera and disturbances.
@@ -453,17 +479,22 @@ def prune_vine(
         visit.note(tracking)
 
     with tempfile.TemporaryDirectory() as folder:
-        path, length = Path(folder) / "trace", VineyardConfig().vine_spacing
-        config = sim_config(Path(folder) / "vine.toml", pictures, PRESETS[preset], _one_vine(training, length))
+        path, length, world, settings = Path(folder) / "trace", VineyardConfig().vine_spacing, PRESETS[preset], {}
+        if preset != "calm":
+            world, settings = calibrated(world), _in_the_field(world)
+        settings |= _one_vine(training, length)
+        config = sim_config(Path(folder) / "vine.toml", pictures, world, settings)
         with ClosedLoop(seed, path, config, "hierarchy", watch, segmenter=segmenter) as loop:
             before = row_of(loop)
             touches, wanted = CaneTouches(staying_rods(before)), wanted_cuts(before, training == "guyot")
             clock = StageClock(load_section(config, "controller", ControllerConfig))
             visit = Visit(loop, Reviewer(loop, decision_s, review, glance_s), clock, length)
+            if preset != "calm":
+                check_camera(loop)
             ended = visit.make()
             ends = {entry.point_id: entry for entry in loop.queue()}
             shown = loop.inbox.newest(m.PruningPoints)
-            sites = () if shown is None else shown.message.undecided_sites
+            sites = *(() if shown is None else shown.message.undecided_sites), *visit.reviewer.left
         record = trace.read(path)
     reviewer = visit.reviewer
     bites = [event for event in record.events if event["event"] == "cut"]
@@ -486,7 +517,16 @@ def prune_vine(
         wall_s=time.perf_counter() - began,
         glance_s=glance_s,
         glances=reviewer.glances,
+        stops=visit.stops,
     )
+
+
+def _in_the_field(world: WorldConfig) -> dict[str, dict[str, object]]:
+    """Settings of a robot that works outdoors: inertial sensors, the delay of its pictures, its place in the row."""
+    return {
+        "bridge": {"inertial": True, "frame_time_offset": world.frame_delay},
+        "perception": {"localise": True},
+    }
 
 
 def _one_vine(training: Training, length: float) -> dict[str, dict[str, object]]:
@@ -513,7 +553,8 @@ def places(
         bites: Of the trace.
         reviewer: With every point that was proposed, and the accepted ones.
         ends: Entries of the queue at the end.
-        sites: What is undecided at the end.
+        sites: Undecided sites at the end of the visit, followed by those that the reviewer left. The last site of a
+            spur gives its reason.
     """
     asked = [(each, each.cut) for each in wanted if each.cut is not None]
     pieces = [piece for bite in bites for piece in bite["severed"]]
@@ -603,6 +644,7 @@ def tell(run: VineRun) -> None:
         f"machine {run.machine_s:.0f} s, "
         f"person {run.person_s:.0f} s in {run.decisions} decisions, {run.glances} glances; {outcomes}; "
         f"{harmed} harmed, {run.contacts}+{run.self_contacts} contacts, {run.wall_s:.0f} s of real time"
+        + (f"; {run.stops} protective stops" if run.stops else "")
         + (f"; not left: {run.ended}" if run.ended else ""),
         flush=True,
     )

@@ -8,7 +8,8 @@ import pinocchio as pin
 from msgspec import Struct
 
 from controller.config import MotionConfig, TeleoperationConfig
-from controller.motion.tool_motion import Rates, ToolMotion, ToolState, quintic
+from controller.motion.rest_to_rest import Rates, quickest
+from controller.motion.tool_motion import ToolMotion, ToolState
 from controller.whole_body.compiled import MATRIX, NOTHING, NUMBER, VECTOR, compiled
 from controller.whole_body.task import ActuatorTask, BaseMode, IkProblem, Method, Posture, Solution, ToolTask
 from rolling_panda import reasons
@@ -198,15 +199,19 @@ def _tracking(out: Solution, desired: Any, error: Array, done: bool) -> Tracking
     return Tracking(out.xi, desired, position, rotation, out.manipulability, out.feasible, out.reason, done, out.scale)
 
 
+#: Limits of a motion of the arm's joints (rad/s, rad/s², rad/s³).
+_HOMING = Rates(0.6, 1.0, 10.0)
+
+
 class ArmMotion:
-    """A motion of the arm's joints with the base still: quintic in every joint."""
+    """A motion of the arm's joints with the base still, all joints in the same time."""
 
     def __init__(self, config: MotionConfig, start: Array, goal: Array) -> None:
         """Plan from one posture (7) to another (7)."""
         self._start, self._span = start, goal - start
         self._gain = config.gain_position
-        self.duration = Rates(0.6, 1.0, 10.0).duration(float(np.abs(self._span).max()))
-        self.time = 0.0
+        self._law = quickest(float(np.abs(self._span).max()), _HOMING)
+        self.duration, self.time = self._law.duration, 0.0
 
     @property
     def done(self) -> bool:
@@ -215,7 +220,7 @@ class ArmMotion:
 
     def step(self, robot: Measured, follower: Follower, dt: float) -> Tracking:
         """One period of `dt` (s). Limits of the joints slow the motion's clock."""
-        progress = quintic(self.time, self.duration)
+        progress = self._law.progress(self.time)
         xi = np.zeros(NXI)
         xi[ARM_XI] = self._span * progress.rate + self._gain * (self._start + self._span * progress.s - robot.q[ARM_Q])
         tracking = follower.jog(xi, robot)

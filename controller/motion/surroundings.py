@@ -28,6 +28,8 @@ class Surroundings:
         self._canes: tuple[Capsule, ...] = ()
         self._cane_obstacles: tuple[Obstacle, ...] = ()
         self._axes = Axes(())
+        self._rigid: tuple[Obstacle, ...] = ()
+        self._rigid_axes = Axes(())
 
     def update(self, obstacles: Received[Obstacles] | None) -> None:
         """Take the newest message; one that was taken before costs nothing."""
@@ -43,6 +45,8 @@ class Surroundings:
         self._canes = tuple(capsule for capsule, _ in both if capsule.kind == "cane")
         self._cane_obstacles = tuple(obstacle for capsule, obstacle in both if capsule.kind == "cane")
         self._axes = Axes(self._cane_obstacles)
+        self._rigid = tuple(obstacle for obstacle in around if obstacle.kind != "cane")
+        self._rigid_axes = Axes(self._rigid)
         self._allow()
 
     def work_at(self, places: tuple[Array, ...]) -> None:
@@ -59,6 +63,11 @@ class Surroundings:
         """Canes that stay, or may stay, whose bark is within a distance (m) of a place (3, m, odom)."""
         gaps = self._axes.gaps(place[None], np.zeros(1))[0]
         return tuple((self._canes[index], self._cane_obstacles[index]) for index in np.flatnonzero(gaps < within))
+
+    def rigid_near(self, place: Array, within: float) -> tuple[Obstacle, ...]:
+        """Wires, posts, trunks and cordons whose surface is within a distance (m) of a place (3, m, odom)."""
+        gaps = self._rigid_axes.gaps(place[None], np.zeros(1))[0]
+        return tuple(self._rigid[index] for index in np.flatnonzero(gaps < within))
 
     def _allow(self) -> None:
         found = touchable(self._canes, self._axes, self._places)

@@ -1,6 +1,6 @@
 """Tool trajectories, corrections of a goal, and the motion of overlapping straight segments with their postures.
 
-Trajectories are straight: a quintic in normalised time along the SE(3) screw from start to goal.
+Trajectories are straight: from start to goal along the SE(3) screw, as fast as velocity, acceleration and jerk allow.
 
 Corrections to the paper's eqs. 13 and 14 stand in docs/paper.md: normalised time instead of the printed matrix, which
 is singular at t_s = 0, and orientation by the logarithm.
@@ -16,63 +16,12 @@ import pinocchio as pin
 from msgspec import Struct
 
 from controller.config import MotionConfig, WholeBodyConfig
+from controller.motion.rest_to_rest import Profile, Progress, Rates, quickest, together
 from controller.whole_body.compiled import NOTHING, NUMBER, PACKED, VECTOR, compiled
 from controller.whole_body.task import BaseMode, Posture
 from rolling_panda.errors import InputError
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import ARM_Q
-
-#: Peaks of s' , s'' and s''' of s = 10τ³ − 15τ⁴ + 6τ⁵ over τ in 0…1.
-PEAK_VELOCITY, PEAK_ACCELERATION, PEAK_JERK = 1.875, 5.7735, 60.0
-
-
-@dataclass(frozen=True)
-class Rates:
-    """Limits of velocity, acceleration and jerk along one distance, in the unit of the distance and seconds."""
-
-    velocity: float
-    acceleration: float
-    jerk: float
-
-    def duration(self, distance: float) -> float:
-        """Shortest time (s) in which a quintic covers `distance` within the bounds."""
-        d = abs(distance)
-        return max(
-            PEAK_VELOCITY * d / self.velocity,
-            math.sqrt(PEAK_ACCELERATION * d / self.acceleration),
-            math.cbrt(PEAK_JERK * d / self.jerk),
-        )
-
-
-class Progress(Struct, frozen=True):
-    """Progress 0…1 along a motion, and its first two time derivatives (1/s, 1/s²)."""
-
-    s: float
-    rate: float
-    acceleration: float
-
-
-def quintic(time: float, duration: float) -> Progress:
-    """The quintic from rest to rest at `time` (s) of `duration` (s); held before and after."""
-    if duration <= 0.0 or time >= duration:
-        return Progress(1.0, 0.0, 0.0)
-    if time <= 0.0:
-        return Progress(0.0, 0.0, 0.0)
-    u = time / duration
-    return Progress(
-        u * u * u * (10.0 + u * (6.0 * u - 15.0)),
-        30.0 * u * u * (1.0 - u) ** 2 / duration,
-        60.0 * u * (1.0 + u * (2.0 * u - 3.0)) / duration**2,
-    )
-
-
-def quintic_time(s: float) -> float:
-    """Normalised time 0…1 at which the quintic reaches the progress `s`."""
-    low, high = 0.0, 1.0
-    for _ in range(30):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if quintic(middle, 1.0).s < s else (low, middle)
-    return 0.5 * (low + high)
 
 
 class ToolState(Struct, frozen=True):
@@ -94,6 +43,7 @@ class PoseTrajectory:
         rotation: Rates,
         at_least: float = 0.0,
         straight: bool = False,
+        others: Sequence[tuple[float, Rates]] = (),
     ) -> None:
         """Plan.
 
@@ -105,6 +55,7 @@ class PoseTrajectory:
             at_least: Shortest duration (s), for other motions in that time.
             straight: True for the straight line between the origins. A screw with a turn bulges sideways by about an
                 eighth of length times rotation. Over a long distance that exceeds the clearance from the canes.
+            others: Distances that are covered in the same time, with their bounds.
         """
         self.start, self.goal = start, goal
         self._straight = straight
@@ -116,16 +67,21 @@ class PoseTrajectory:
             self._linear, self._angular = screw.linear, screw.angular
         self.length = float(np.linalg.norm(self._linear))
         # Along a screw, the tool's origin moves at the length of the body's linear velocity: the length of its arc.
-        self.duration = max(
-            translation.duration(self.length),
-            rotation.duration(float(np.linalg.norm(self._angular))),
-            at_least,
-            1e-3,
-        )
+        turn = float(np.linalg.norm(self._angular))
+        self._law = quickest(1.0, together((self.length, translation), (turn, rotation), *others))
+        self.duration = max(self._law.duration, at_least, 1e-3)
+
+    def progress(self, time: float) -> Progress:
+        """How far it is at `time` (s) of the motion's own clock."""
+        return self._law.over(time, self.duration)
+
+    def when(self, s: float) -> float:
+        """When it has come as far as `s` (s)."""
+        return self.duration * self._law.when(s)
 
     def at(self, time: float) -> ToolState:
         """Pose, twist and its rate at `time` (s) of the motion's own clock, in odom's axes."""
-        progress = quintic(time, self.duration)
+        progress = self.progress(time)
         placement = self._placement(progress.s)
         if progress.rate == 0.0:
             return ToolState(placement, np.zeros(6), np.zeros(6))
@@ -154,7 +110,7 @@ class PoseTrajectory:
         """
         if not self._straight:
             raise InputError("a motion along a screw cannot be carried along; plan it with straight=True")
-        at = quintic(time, self.duration)
+        at = self.progress(time)
         _add(self._linear, self._angular, at.s, at.rate, at.acceleration, position, R, twist, acceleration)
 
     def _placement(self, s: float) -> Any:
@@ -208,38 +164,42 @@ def _add(
 class Correction:
     """A straight shift of the rest of a motion.
 
-    It is a quintic that begins and ends with zero velocity and acceleration. So its sum with the motion is continuous
-    in position, velocity and acceleration, and ends at rest at the new goal.
+    It begins and ends with zero velocity and acceleration. So its sum with the motion is continuous in position,
+    velocity and acceleration, and ends at rest at the new goal.
 
     Attributes:
         begin: Start on the motion's clock (s).
-        duration: Duration (s).
+        law: How much of it has been made when.
         by: Displacement of the tool (3, m, odom).
         base: Displacement of the base (2, m, odom).
     """
 
     begin: float
-    duration: float
+    law: Profile
     by: Array
     base: Array
 
     @classmethod
     def within(cls, begin: float, by: Array, base: Array, rates: Rates) -> "Correction":
         """The shortest one within bounds of the tool's velocity, acceleration and jerk."""
-        return cls(begin, max(rates.duration(float(np.linalg.norm(by))), 1e-3), by, base)
+        return cls(begin, quickest(max(float(np.linalg.norm(by)), _LEAST), rates), by, base)
 
     @property
     def end(self) -> float:
         """When it has been made, on the motion's clock (s)."""
-        return self.begin + self.duration
+        return self.begin + self.law.duration
 
     def progress(self, time: float) -> Progress:
         """How much of it has been made at `time` (s)."""
-        return quintic(time - self.begin, self.duration)
+        return self.law.progress(time - self.begin)
 
 
-#: Assumed limits of the arm's joints for a segment (rad/s, rad/s², rad/s³).
-_ARM = Rates(1.3, 4.0, 60.0)
+#: A correction is of no less (m).
+_LEAST = 1e-9
+#: Assumed limits of the arm's joints for a segment (rad/s, rad/s², rad/s³), with margin for feedback.
+_ARM = tuple(
+    Rates(v, a, 60.0) for v, a in zip((1.3,) * 4 + (1.5,) * 3, (6.0, 3.0, 4.0, 5.0, 6.0, 8.0, 8.0), strict=True)
+)
 #: A displacement of the base (2, m) that is none.
 _STAYS: Array = np.zeros(2)
 #: Tolerance of the base's duration (s).
@@ -285,16 +245,16 @@ class _Timed:
         if arm_until + within > 0.0:
             if arm_until + within >= length:
                 return None
-            begin += duration * quintic_time(arm_until / length)
-            end -= duration * (1.0 - quintic_time(1.0 - within / length))
+            begin += self.trajectory.when(arm_until / length)
+            end -= duration - self.trajectory.when(1.0 - within / length)
         return (begin, min(end, until)) if begin < min(end, until) else None
 
 
 class ToolMotion:
     """A sequence of segments. A segment begins while the previous one still decelerates.
 
-    Each segment is a quintic from rest to rest. Where two overlap, their motions add up: the tool rounds the corner
-    without stopping, with continuous velocity and acceleration. The base follows its own quintic, from the first to the
+    Each segment goes from rest to rest. Where two overlap, their motions add up: the tool rounds the corner without
+    stopping, with continuous velocity and acceleration. The base goes from rest to rest as well, from the first to the
     last time at which it may move. The clock of the motion advances as fast as the limits allow.
     """
 
@@ -330,6 +290,7 @@ class ToolMotion:
         self._goal_place = self.goal.translation.tolist()
         self._free = _free(self._legs)
         self._base_span = self.q_goal[:2] - q_start[:2]
+        self._drive = _drive(limits, self._base_span)
         self.legs = len(legs)
         self.duration = max(leg.end for leg in self._legs)
         self.time, self.scale = 0.0, 1.0
@@ -436,12 +397,12 @@ class ToolMotion:
         for leg in self._legs:
             if self.time <= leg.begin:
                 break
-            progress = quintic(self.time - leg.begin, leg.trajectory.duration)
+            progress = leg.trajectory.progress(self.time - leg.begin)
             _go_along(leg.span, progress.s, progress.rate, q, rate)
         if self._free is None:
             q[:2], rate[:2] = self._q_start[:2], 0.0
         else:
-            progress = quintic(self.time - self._free[0], self._free[1] - self._free[0])
+            progress = self._drive.over(self.time - self._free[0], self._free[1] - self._free[0])
             q[:2] = self._q_start[:2] + self._base_span * progress.s
             rate[:2] = self._base_span * progress.rate
             for made in self._corrections:
@@ -470,9 +431,7 @@ def _timed(
     config: MotionConfig, limits: WholeBodyConfig, start: Any, q_start: Array, legs: Sequence[Leg], flows: bool
 ) -> tuple[_Timed, ...]:
     """The legs in their places, with time enough for the base between them."""
-    travel = float(np.hypot(*(legs[-1].q_goal[:2] - q_start[:2])))
-    # With margin for feedback.
-    base_s = Rates(0.8 * limits.base_speed, 0.75 * limits.base_acceleration, 10.0).duration(travel)
+    base_s = _drive(limits, legs[-1].q_goal[:2] - q_start[:2]).duration
     # The segment that waits for the base: there the line of the tool matters least.
     waits = next((i for i, leg in enumerate(legs) if leg.frozen_until == leg.frozen_within == 0.0), None)
     extra = 0.0
@@ -483,6 +442,12 @@ def _timed(
             return timed
         # A longer segment overlaps more with its neighbours, so this converges from below.
         extra = timed[waits].trajectory.duration + base_s - (free[1] - free[0])
+
+
+def _drive(limits: WholeBodyConfig, span: Array) -> Profile:
+    """The quickest motion of the base over its span (2, m), with margin for feedback."""
+    rates = Rates(0.8 * limits.base_speed, 0.75 * limits.base_acceleration, 10.0)
+    return quickest(math.hypot(*span.tolist()), rates)
 
 
 def _placed(
@@ -497,15 +462,14 @@ def _placed(
     out: list[_Timed] = []
     for number, leg in enumerate(legs):
         span = leg.q_goal - q_start
-        # Time for the joints, with margin for feedback.
-        arm_s = _ARM.duration(float(np.abs(span[ARM_Q]).max()))
         trajectory = PoseTrajectory(
             start,
             leg.goal,
             Rates(leg.speed, config.tool_acceleration, config.tool_jerk),
             Rates(config.tool_turn, 3.0 * config.tool_acceleration, 3.0 * config.tool_jerk),
-            max(arm_s, at_least) if number == waits else arm_s,
+            at_least if number == waits else 0.0,
             straight=True,
+            others=tuple(zip(span[ARM_Q].tolist(), _ARM, strict=True)),
         )
         begin = 0.0
         if out:

@@ -1,6 +1,7 @@
 """Planner of the accepted cuts: a collision-free posture for each, the fastest order, and the rollout of the work."""
 
 import hashlib
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -102,7 +103,9 @@ class CutPlanner:
             places = {name: place for place, name in enumerate(request.order)}
             return sorted(names, key=lambda name: places.get(name, len(places)))
         start = self._robot.pose(request.q, self._robot.tool_id).copy(), request.q
-        fastest = [names[i] for i in shortest(travel_times(self._config, self._flows, start, list(cuts.values())))]
+        stops = list(cuts.values())
+        times = travel_times(self._config, self._flows, start, stops)
+        fastest = [names[i] for i in shortest(times, leaving_times(self._config, request.q, stops))]
         tried = dict(request.tries)
         return sorted(self._freed(request, cuts, fastest), key=lambda name: name in tried)
 
@@ -198,11 +201,26 @@ def travel_times(config: ControllerConfig, flows: bool, start: tuple[Any, Array]
     )
 
 
-def shortest(costs: Array) -> list[int]:
+def leaving_times(config: ControllerConfig, q: Array, cuts: Sequence[CutPlan]) -> Array:
+    """Times (n, s) to drive on from each cut to where the base has come farthest along the row: work goes on there.
+
+    Args:
+        config: Section `[controller]`.
+        q: Configuration (12) at the start.
+        cuts: The cuts.
+    """
+    heading = config.work.row_heading
+    along = np.array([q[:2], *(cut.q_cut[:2] for cut in cuts)]) @ [math.cos(heading), math.sin(heading)]
+    out: Array = (along.max() - along[1:]) / config.whole_body.base_speed
+    return out
+
+
+def shortest(costs: Array, ends: Array | None = None) -> list[int]:
     """An order of n stops of little cost: nearest first, then turned round and moved about while that saves time.
 
     Args:
         costs: (n+1 × n) from the start (row 0) and from each stop to each; need not be symmetric.
+        ends: (n) of ending at each stop; None for nothing.
     """
     n = costs.shape[1]
     order: list[int] = []
@@ -212,25 +230,25 @@ def shortest(costs: Array) -> list[int]:
         order.append(nearest)
         left.remove(nearest)
         at = nearest + 1
-    best = length(costs, order)
+    best = length(costs, order, ends)
     improved = True
     while improved:
         improved = False
         for candidate in _neighbours(order):
-            cost = length(costs, candidate)
+            cost = length(costs, candidate, ends)
             if cost < best - _WORTH:
                 order, best, improved = candidate, cost, True
                 break
     return order
 
 
-def length(costs: Array, order: Sequence[int]) -> float:
-    """Cost of an order, from the start to its last stop."""
+def length(costs: Array, order: Sequence[int], ends: Array | None = None) -> float:
+    """Cost of an order, from the start to its last stop, and of ending there."""
     total, at = 0.0, 0
     for stop in order:
         total += float(costs[at, stop])
         at = stop + 1
-    return total
+    return total + (float(ends[order[-1]]) if ends is not None and len(order) else 0.0)
 
 
 def _neighbours(order: list[int]) -> list[list[int]]:

@@ -27,8 +27,8 @@ from controller.whole_body.velocity_bounds import Bounds, VelocityBounds
 from rolling_panda.model.differential_drive import NXI, Array
 from rolling_panda.model.robot import ARM_XI, RobotModel
 
-#: Rate of the clock below which it counts as stopped.
-_HELD = 1e-2
+#: Rate of the clock below which it counts as stopped, and below which what slows it is told.
+_HELD, _SLOW = 1e-2, 5e-2
 #: Scale below which motion by hand reports the limiting constraint.
 _MISSED = 0.5
 #: Unit velocities of the tool for the damping (m/s, rad/s), independent of the planned speed.
@@ -196,7 +196,8 @@ class Hierarchy:
         if worst >= 0:
             return Solution(xi, scale, manipulability.value, False, names[worst])
         held = problem.tool.keep_path and answer.scale < _HELD
-        if held or (answer.missing > _MISSED and answer.holds >= 0):
+        slow = problem.tool.keep_path and answer.scale < _SLOW and answer.holds >= 0
+        if held or slow or (answer.missing > _MISSED and answer.holds >= 0):
             what = _holder(answer.holds, free, names)
             # Sliding along a constraint is a valid solution of motion by hand; it is only reported.
             return Solution(xi, scale, manipulability.value, not held, what)

@@ -6,13 +6,15 @@ import numpy as np
 
 from controller.config import MotionConfig
 from controller.motion.follower import Follower, Measured, Tracking
-from controller.motion.tool_motion import quintic
+from controller.motion.rest_to_rest import Rates, quickest
 from rolling_panda.model.differential_drive import Array
 
 #: Positions of ξ (9, rad) and of the tool (3, m) along a way, a control period apart at most.
 Trail = Sequence[tuple[Array, Array]]
 #: Times the duration of the way there without its stops, and least duration (s).
 _SLOWER, _SHORTEST_S = 2.0, 1.0
+#: Its progress begins and ends gently: a third of the time it speeds up, and a third it slows down.
+_GENTLE = quickest(1.0, Rates(1.5, 6.75, 60.0))
 #: Within this time the contact has to end (s).
 _FREE_S = 0.6
 #: A motion that has not ended this long after its planned end is given up (s).
@@ -45,7 +47,7 @@ class BackOff:
 
     def step(self, robot: Measured, follower: Follower, beyond: bool) -> Tracking:
         """One period; with `beyond` a limit of the contact is passed, which ends this way back once it has begun."""
-        progress = quintic(self._time, self._duration)
+        progress = _GENTLE.over(self._time, self._duration)
         last = len(self._way) - 1
         at = progress.s * last
         index = min(int(at), last - 1)

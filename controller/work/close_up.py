@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
+import pinocchio as pin
 from msgspec.structs import replace
 
 from controller.config import WorkConfig
@@ -44,6 +45,7 @@ class _Asked:
         first: Number of the first request that counts.
         came: Pictures that came.
         seen: What those told that showed the cane.
+        last: What the newest one told; None before one came.
         begun: When it was requested (s).
         since: When its newest picture was (s).
         sent_at: When that request was sent last (s).
@@ -58,6 +60,7 @@ class _Asked:
     since: float
     came: int = 0
     seen: list[CloseUpResult] = field(default_factory=list)
+    last: CloseUpResult | None = None
     sent_at: float = -math.inf
     answer: CloseUpResult | None = None
 
@@ -123,7 +126,7 @@ class CloseUpClient:
         # A late result counts too: on a slow machine each picture is late.
         if asked is None or not asked.first <= result.number <= asked.number or asked.answer is not None:
             return
-        asked.came += 1
+        asked.came, asked.last = asked.came + 1, result
         if result.finding == asked.expected:
             asked.seen += [result] if result.position is not None else []
             wait, most = len(asked.seen) < _SWAYING and asked.sways(), self._blind
@@ -158,14 +161,19 @@ class CloseUpClient:
         if asked is None:
             return None
         if asked.answer is None and now - asked.begun > self._timeout_s:
-            asked.answer = CloseUpResult(
-                header=m.Header(),
-                point_id=point_id,
-                number=asked.number,
-                finding="unseen",
-                reason=reasons.no_close_up(self._timeout_s),
-            )
+            asked.answer = self._in_time(point_id, asked)
         return asked.answer
+
+    def _in_time(self, point_id: str, asked: _Asked) -> CloseUpResult:
+        """The result where the time limit is over: of the pictures that came, if the newest one contradicts nothing.
+
+        One picture that contradicts what is expected does not count: a second one has to do so too.
+        """
+        if asked.last is not None and asked.last.finding in (asked.expected, "unseen"):
+            return asked.conclusion(asked.last)
+        why = reasons.no_close_up(self._timeout_s)
+        header = m.Header()
+        return CloseUpResult(header=header, point_id=point_id, number=asked.number, finding="unseen", reason=why)
 
     def _again(self, asked: _Asked, at: float) -> None:
         self._number += 1
@@ -283,6 +291,8 @@ class PostCutCheck:
 
 #: From a larger distance the base has to move before the tool enters the canes (m).
 _BASE_NEAR = 0.1
+#: A picture from another side than the last one is taken within this of the tool's orientation there (rad).
+_TURNED = 0.05
 
 
 def not_as_accepted(close_up: CloseUpResult, ticket: Ticket | None) -> Reason | None:
@@ -303,14 +313,9 @@ def not_as_accepted(close_up: CloseUpResult, ticket: Ticket | None) -> Reason | 
     return None
 
 
-def undecided(close_up: CloseUpResult) -> bool:
-    """Whether pictures came and do not tell, so that those from another side may.
-
-    A cane that sways, or that lacks depth, may seem severed or changed though it is neither.
-    """
-    if close_up.finding in ("severed", "changed"):
-        return True
-    return close_up.finding == "unseen" and (close_up.reason is None or close_up.reason.code != "no_close_up")
+def no_picture(close_up: CloseUpResult) -> bool:
+    """Whether no picture came in time."""
+    return close_up.reason is not None and close_up.reason.code == "no_close_up"
 
 
 def _why(close_up: CloseUpResult) -> Reason:
@@ -325,15 +330,19 @@ def _aside(close_up: CloseUpResult, place: Array) -> float:
     return float(np.linalg.norm(off - along * (off @ along)))
 
 
-def camera_ready(robot: Measured, motion: ToolMotion, config: WorkConfig) -> bool:
+def camera_ready(robot: Measured, motion: ToolMotion, config: WorkConfig, other_side: bool) -> bool:
     """Whether the camera has the point in view from near, and hardly moves.
 
     Args:
         robot: Measured robot.
         motion: To where the tool is clear of the canes.
         config: How near, and how slow.
+        other_side: Whether a picture from elsewhere has not told enough, or the way in had no room there.
     """
-    away = math.dist(robot.kinematics.T_odom_tool.translation, motion.goal.translation)
+    tool = robot.kinematics.T_odom_tool
+    away = math.dist(tool.translation, motion.goal.translation)
     if away >= config.close_up_within or math.dist(robot.q[:2], motion.q_goal[:2]) >= _BASE_NEAR:
+        return False
+    if other_side and np.linalg.norm(pin.log3(tool.rotation.T @ motion.goal.rotation)) >= _TURNED:
         return False
     return math.hypot(*(robot.kinematics.J_xi[:3] @ robot.sent)) < config.close_up_speed

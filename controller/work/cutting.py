@@ -13,7 +13,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, Final, Protocol
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from controller.whole_body.saturation import Saturation
 from controller.work.back_off import BackOff, Trail
 from controller.work.base_views import BaseViews
 from controller.work.camera_views import CameraViews, Refusal
-from controller.work.close_up import CloseUpClient, PostCutCheck, camera_ready, not_as_accepted, undecided
+from controller.work.close_up import CloseUpClient, PostCutCheck, camera_ready, no_picture, not_as_accepted
 from controller.work.homing import Withdrawal
 from controller.work.point_queue import TOLD_MOVED, PointQueue
 from controller.work.posture_search import (
@@ -189,6 +189,8 @@ _REFINED = 0.0003
 _AMONG = 0.03
 #: Distance to the end of a motion at which the next one begins (m).
 _NEAR = 0.02
+#: Where the way out leads.
+_CLEAR: Final[reasons.Goal] = "a place clear of the canes"
 
 
 @dataclass
@@ -255,6 +257,14 @@ class Parts:
         """Come to rest, or stay there; with a reason the work pauses."""
         return StepResult(self.saturation.ramp(robot.sent), pause=pause)
 
+    def withdrawal(self, robot: Measured, goal: Any, posture: Array) -> Withdrawal | None:
+        """The arm's way by its joints to a tool pose (pin.SE3); None where none is found.
+
+        Its end is sought from the arm's own posture, and then from `posture` (7, rad).
+        """
+        clear = self.search.arm_at(goal, robot.q, robot.q[ARM_Q], posture)
+        return None if clear is None else Withdrawal(self.config, self.follower, robot.q, clear)
+
 
 class FollowedMotion:
     """A tool motion under way, with its timeout."""
@@ -303,6 +313,7 @@ class CutTask:
         planned: Poses and postures in map.
         frame: Where odom is in map.
         turned: Whether a close-up has had it approached another way than planned.
+        arranged: Whether the arm has been brought into the planned posture by its joints.
     """
 
     point_id: str
@@ -310,6 +321,7 @@ class CutTask:
     planned: CutPlan
     frame: MapFrame
     turned: bool = False
+    arranged: bool = False
 
     @cached_property
     def plan(self) -> CutPlan:
@@ -402,6 +414,9 @@ Step = tuple[Stage, StepResult]
 _REST_S = 0.2
 #: After so many pushes without a cut between them a person has to look.
 _PUSHES = 3
+#: An arm that is so far from its posture (rad), where the tool hardly moves, is brought into it before the canes are
+#: entered: below this share of the manipulability at which the tool moves well.
+_ASTRAY, _HARDLY = 0.6, 0.5
 #: Longest wait for a plan at the end of the work (s).
 _PLAN_WAIT_S = 15.0
 
@@ -457,7 +472,7 @@ class Escape(Stage):
 
 
 class Escaping(Stage):
-    """Moving the tool clear of the canes."""
+    """Moving the tool straight clear of the canes."""
 
     phase: m.Phase = "RETREAT"
     yields = True
@@ -469,11 +484,35 @@ class Escaping(Stage):
 
     def step(self, robot: Measured, now: float) -> Step:
         """One period."""
-        tracking = self._way.track(robot)
+        parts, tracking = self._parts, self._way.track(robot)
         if self._way.timeout.over(tracking, now, _NEAR):
+            return Rest(parts).step(robot, now)
+        if not self._way.timeout.late(now):
+            return self, StepResult(tracking.xi, tracking)
+        withdrawal = parts.withdrawal(robot, self._way.motion.goal, np.array(parts.config.work.home))
+        if withdrawal is None:
+            return self, parts.brake(robot, missed(_CLEAR, tracking))
+        return EscapingByJoints(parts, withdrawal), StepResult(tracking.xi, tracking)
+
+
+class EscapingByJoints(Stage):
+    """Moving the tool clear of the canes by the arm's joints, after the straight way has failed. The base rests."""
+
+    phase: m.Phase = "RETREAT"
+    yields = True
+
+    def __init__(self, parts: Parts, withdrawal: Withdrawal) -> None:
+        """To where `withdrawal` leads."""
+        super().__init__(parts, withdrawal)
+        self._withdrawal = withdrawal
+
+    def step(self, robot: Measured, now: float) -> Step:
+        """One period."""
+        tracking = self._withdrawal.step(robot, now)
+        if self._withdrawal.done:
             return Rest(self._parts).step(robot, now)
-        if self._way.timeout.late(now):
-            return self, self._parts.brake(robot, missed("a place clear of the canes", tracking))
+        if self._withdrawal.late:
+            return self, self._parts.brake(robot, missed(_CLEAR, tracking))
         return self, StepResult(tracking.xi, tracking)
 
 
@@ -583,18 +622,22 @@ class MovingStage(TaskStage):
         plan, motion = self._task.plan, self._way.motion
         motion.shift(plan.poses.clear.translation - before.poses.clear.translation, (plan.q_clear - before.q_clear)[:2])
 
-    def _another_time(self, robot: Measured, why: m.Reason) -> Step:
-        """Leave the cut for a try from another side, after the others. The tool is still clear of the canes."""
-        told = self.put_off(reasons.missed_once(why), why)
+    def _another_time(self, robot: Measured, why: m.Reason, from_another_side: bool = True) -> Step:
+        """Leave the cut for another try, after the others. The tool is still clear of the canes."""
+        again = reasons.missed_once(why) if from_another_side else reasons.not_seen_once(why)
+        told = self.put_off(again, why, from_another_side=from_another_side)
         return Escape(self._parts), self._parts.brake(robot).with_event(told)
 
-    def put_off(self, again: m.Reason, why: m.Reason, met: Line | None = None) -> m.Reason:
-        """Leave the cut for a try from another side, after the others.
+    def put_off(
+        self, again: m.Reason, why: m.Reason, met: Line | None = None, from_another_side: bool = True
+    ) -> m.Reason:
+        """Leave the cut for another try, after the others.
 
         Args:
             again: Reason while the cut is to be tried again.
             why: Reason where this was the last try.
             met: Axis of the cane in the way (m, map); None without one.
+            from_another_side: Whether the next try takes another approach.
 
         Returns:
             What is logged.
@@ -603,7 +646,8 @@ class MovingStage(TaskStage):
         # Nothing that was found before leads to the next try.
         parts.next_cut.forget()
         parts.close_ups.forget(self.point_id)
-        return parts.queue.put_off(self.point_id, Tried(self._task.planned.approach, met), again, why)
+        approach = self._task.planned.approach if from_another_side else None
+        return parts.queue.put_off(self.point_id, Tried(approach, met), again, why)
 
     def _retreat(self, robot: Measured) -> "Retreat":
         """Straight out of the canes, and on to the next cut where one is found."""
@@ -642,15 +686,65 @@ class Travel(MovingStage):
         last = motion.leg == motion.legs - 1
         if last and not config.work.pre_cut_check:
             return Advance(parts, self._task, self._way), result
-        if last and camera_ready(robot, motion, config.work):
+        failed = any(tried.approach is not None for tried in parts.queue.tries.of(self.point_id))
+        if last and camera_ready(robot, motion, config.work, self._task.turned or failed):
+            if self._astray(robot, tracking.manipulability):
+                return Arranging(parts, self._task, self._way), parts.brake(robot)
             parts.close_ups.ask(self.point_id, "seen", now, self._task.accepted_in_odom)
             timeout.again()
             return CloseUp(parts, self._task, self._way), result
         if not (config.work.pre_cut_check and timeout.over(tracking, now, 0.0)) and timeout.late(now):
             why = missed("the stand-off", tracking)
-            # What holds it back would do so again. Without that it is the base, on wheels that have slipped.
-            return self._fail(robot, self.point_id, why) if tracking.reason else self._another_time(robot, why)
+            # What stops it would do so again. Else the base is elsewhere, on wheels that have slipped, or the arm is
+            # in a posture in which the tool hardly moves.
+            return self._another_time(robot, why) if tracking.feasible else self._fail(robot, self.point_id, why)
         return self, result
+
+    def _astray(self, robot: Measured, manipulability: float) -> bool:
+        """Whether the arm is in another posture than planned, in which the tool hardly moves."""
+        off = np.abs(robot.q[ARM_Q] - self._way.motion.posture().q[ARM_Q]).max()
+        hardly = _HARDLY * self._parts.config.whole_body.hierarchy.good_manipulability
+        return not self._task.arranged and float(off) > _ASTRAY and manipulability < hardly
+
+
+class Arranging(MovingStage):
+    """The arm moves by its joints into the planned posture, with the tool clear of the canes.
+
+    The way of the tool from the last cut has led it into another one, near a singularity.
+    """
+
+    phase: m.Phase = "APPROACH"
+
+    def __init__(self, parts: Parts, task: CutTask, way: FollowedMotion) -> None:
+        """For one cut, from the end of `way`."""
+        super().__init__(parts, replace(task, arranged=True), way)
+        self._arm: Withdrawal | None = None
+
+    def hold(self) -> None:
+        """The robot stands in this period."""
+        if self._arm is not None:
+            self._arm.hold()
+
+    def step(self, robot: Measured, now: float) -> Step:
+        """One period."""
+        parts, plan = self._parts, self._task.plan
+        if left := self._left(self.point_id, self._task.accepted):
+            return self._escape(robot, now, left)
+        if parts.ending:
+            return self, parts.brake(robot, parts.ending)
+        if self._arm is None or self._arm.done:
+            # One motion ends, and the other begins, at rest.
+            if np.any(robot.sent):
+                return self, parts.brake(robot)
+            if self._arm is not None:
+                legs = parts.segments.to(plan, robot.kinematics.T_odom_tool, robot.q)
+                way = FollowedMotion(parts, robot, *legs, to_cut=True)
+                return Travel(parts, self._task, way), parts.brake(robot)
+            self._arm = Withdrawal(parts.config, parts.follower, robot.q, plan.q_clear)
+        tracking = self._arm.step(robot, now)
+        if self._arm.late:
+            return self._another_time(robot, missed("the stand-off", tracking))
+        return self, StepResult(tracking.xi, tracking)
 
 
 class CloseUp(MovingStage):
@@ -676,8 +770,9 @@ class CloseUp(MovingStage):
             # The next period leaves it.
             return self, result.with_event(told)
         if why := not_as_accepted(close_up, ticket):
-            if undecided(close_up) and not parts.queue.last_try(self.point_id):
-                return self._another_time(robot, why)
+            # A cane that sways, or that lacks depth, may seem severed or changed though it is neither.
+            if close_up.finding != "seen" and not parts.queue.last_try(self.point_id):
+                return self._another_time(robot, why, from_another_side=not no_picture(close_up))
             parts.queue.void(self.point_id, why)
             # The next period leaves it.
             return self, result
@@ -815,7 +910,7 @@ class Advance(MovingStage):
         return self, result
 
 
-_WayIn = Travel | CloseUp | Fitting | Advance
+_WayIn = Travel | Arranging | CloseUp | Fitting | Advance
 
 
 def _axis_in_map(touch: Touch, frame: MapFrame) -> Line | None:
@@ -884,7 +979,11 @@ class Retreat(LeavingStage):
         if timeout.over(tracking, now, _NEAR):
             return self._out(robot, tracking, now)
         if timeout.late(now):
-            withdrawal = Withdrawal(parts.config, parts.follower, robot.q, self._task.plan.q_clear)
+            # The base may have gone on, so that the planned posture would have the tool elsewhere.
+            plan = self._task.planned.in_odom(robot.frame)
+            withdrawal = parts.withdrawal(robot, plan.poses.clear, plan.q_clear[ARM_Q])
+            if withdrawal is None:
+                return self, parts.brake(robot, missed("the way back", tracking))
             event = reasons.retreat_by_joints(self.point_id, missed("the way back", tracking))
             return Withdraw(parts, self._task, withdrawal), result.with_event(event)
         return self, result

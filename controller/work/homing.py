@@ -21,12 +21,17 @@ _ROOM = 0.03
 _NEAR = 0.01
 #: Rate of the clock, and time below it (s), from which the motion counts as blocked.
 _HELD, _PATIENCE_S = 0.02, 1.5
+#: The same for the rest of the straight way once the tool is clear of the canes: the joints turn home from there.
+_SLOW = 0.05
 #: Distance to the pose clear of the canes at which the next motion begins (m).
 _CLEAR = 0.02
 
 
 class Homing:
-    """One homing motion. Call `step` until `done`; stop calling it to stop the motion."""
+    """One homing motion: straight out of the canes, then by joints. Call `step` until `done`; stop calling it to stop.
+
+    Where the straight way is blocked by the time the tool is clear of the canes, the joints turn home from there.
+    """
 
     def __init__(self, config: ControllerConfig, follower: Follower, dt: float, posture: Array | None = None) -> None:
         """Bind the parts for a control period of `dt` (s); the goal is `posture` (7, rad), or the survey posture."""
@@ -49,8 +54,11 @@ class Homing:
             if self._out is not None:
                 tracking = self._follower.follow(self._out, robot)
                 if not tracking.done or tracking.position_error > _CLEAR:
-                    self._wait(tracking.done or tracking.scale < _HELD, tracking)
-                    return tracking.xi
+                    clear = escape_pose(self._config.work, pose, robot.frame, 0.0) is None
+                    self._wait(tracking.done or tracking.scale < (_SLOW if clear else _HELD), tracking)
+                    if not (self.blocked and clear):
+                        return tracking.xi
+                    self._held_s, self.blocked = 0.0, ""
             self._in = ArmMotion(self._config.motion, robot.q[ARM_Q].copy(), self._goal)
         tracking = self._in.step(robot, self._follower, self._dt)
         self._wait(tracking.scale < _HELD, tracking)
@@ -73,10 +81,9 @@ def go_home(homing: Homing, robot: Measured, saturation: Saturation, blocked: Ca
 
 
 class Withdrawal:
-    """A joint-space retreat with the base at rest: each joint returns straight to its position before the approach.
+    """A joint-space retreat with the base at rest: each joint goes straight to its position where the tool is clear.
 
-    The joints thus move away from their limits. The collision guard stays on. The blades deviate from the line of the
-    approach by a few centimetres at most.
+    The collision guard stays on. The blades deviate from a straight line as `PostureSearch.arm_at` allows.
     """
 
     def __init__(self, config: ControllerConfig, follower: Follower, q: Array, q_clear: Array) -> None:

@@ -278,9 +278,10 @@ class Movement:
             return self.ramp()
         xi = homing.step(robot)
         if homing.blocked:
-            self._event_log.log(reasons.homing_blocked(homing.blocked))
-            self._homing = None
-        elif homing.done:
+            self._homing, why = None, reasons.homing_blocked(homing.blocked)
+            self._event_log.log(why)
+            return MotionResult(xi, remark=why)
+        if homing.done:
             self._homing = None
             self._event_log.log(reasons.arm_home())
             return MotionResult(xi, remark=reasons.arm_home())

@@ -12,7 +12,7 @@ from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import chain, pairwise, product
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -167,6 +167,8 @@ _FITS = 12
 #: wrist to the flange (m).
 _ARM_LENGTH, _WRIST_TO_FLANGE = 0.3266 + 0.3928 + 0.088, 0.107
 _SHOULDER_HEIGHT = 0.333
+#: Largest distance of the tool from a straight line where the joints take it out of the canes (m).
+_STRAY = 0.05
 _GOOD_MARGIN, _GOOD_OMEGA = 0.25, 0.035
 _LEAST_MARGIN, _LEAST_OMEGA = 0.08, 0.012
 _ITERATIONS, _LARGEST_STEP, _PULL = 45, 0.25, 0.02
@@ -191,6 +193,11 @@ def approaches(azimuth: float | None, kind: CutKind) -> tuple[Approach, ...]:
 def places(point: PruningPoint) -> tuple[float, ...]:
     """Where a cut may be made along its wood (m past the point), the point itself first."""
     return tuple(along for along in _ALONG if -point.inward <= along <= point.outward)
+
+
+def _approaches_of(tried: Sequence[Tried]) -> list[Approach]:
+    """Approaches that have failed."""
+    return [each.approach for each in tried if each.approach is not None]
 
 
 def _both(sizes: tuple[float, ...]) -> tuple[float, ...]:
@@ -346,8 +353,8 @@ class PostureSearch:
         position = np.array(point.position) + along * tangent
         usual = len(APPROACHES if azimuth is None else TILTS)
         wanted = approaches(azimuth, point.kind)
-        if tried:
-            wanted = yield from self._others(wanted, tried, position, tangent)
+        if failed := _approaches_of(tried):
+            wanted = yield from self._others(wanted, failed, tried, position, tangent)
             usual = len(wanted)
         for number, approach in enumerate(wanted):
             # More approaches help where something is in the way, not where the arm does not get there.
@@ -412,7 +419,7 @@ class PostureSearch:
             lack, why = self._clearance.tool_too_near(poses, point, spare)
             if spare and 0.0 < lack <= _SPARE:
                 narrow.append((approach, along, False))
-            why = why or self._clearance.bitten(self._poses(in_map + shift, tangent, approach).cut, point)[1]
+            why = why or self._clearance.bitten(self._poses(in_map + shift, tangent, approach).cut, point)
             yield
             if why is None:
                 left -= 1
@@ -451,7 +458,7 @@ class PostureSearch:
         others = {
             each
             for each in approaches(azimuth, point.kind)
-            if each != planned and all(math.dist(each, one.approach) >= _ANOTHER for one in tried)
+            if each != planned and all(math.dist(each, one) >= _ANOTHER for one in _approaches_of(tried))
         }
         return [planned, *sorted(others, key=lambda each: (math.dist(each, planned), each))]
 
@@ -493,13 +500,18 @@ class PostureSearch:
         return cut_poses(position, tangent, self._left, config.stand_off, config.clearance, *approach)
 
     def _others(
-        self, wanted: Sequence[Approach], tried: Sequence[Tried], position: Array, tangent: Array
+        self,
+        wanted: Sequence[Approach],
+        failed: Sequence[Approach],
+        tried: Sequence[Tried],
+        position: Array,
+        tangent: Array,
     ) -> Generator[None, None, tuple[Approach, ...]]:
-        """Those that are others than the tried ones: with the most room beside the canes that were met first."""
+        """Those that are others than the failed ones: with the most room beside the canes that were met first."""
         met = [each.cane for each in tried if each.cane is not None]
         room: dict[Approach, float] = {}
         for approach in wanted:
-            if min(math.dist(approach, each.approach) for each in tried) < _ANOTHER:
+            if min(math.dist(approach, each) for each in failed) < _ANOTHER:
                 continue
             try:
                 poses = self._poses(position, tangent, approach)
@@ -515,6 +527,35 @@ class PostureSearch:
         shoulder = T_odom_base.act(self._shoulder)
         wrist = goal.translation - (self._tool_length + _WRIST_TO_FLANGE) * goal.rotation[:, 2]
         return float(np.linalg.norm(wrist - shoulder)) > _ARM_LENGTH
+
+    def arm_at(self, goal: Any, q: Array, *postures: Array) -> Array | None:
+        """A configuration (12) with the tool at a pose and the base where it is, far enough from singularities.
+
+        On the way there by joints the tool comes off a straight line by 50 mm at most. A vain search takes some 10 ms.
+
+        Args:
+            goal: Of the tool (pin.SE3), in the frame of q.
+            q: Configuration (12).
+            postures: Of the arm (7, rad), from which one is sought in turn.
+
+        Returns:
+            None where none is found.
+        """
+        for posture in postures:
+            start = q.copy()
+            start[ARM_Q] = posture
+            found = completed(self._solve(start, goal, posture))
+            good = found is not None and found.margin >= _LEAST_MARGIN and found.omega >= _LEAST_OMEGA
+            if found is not None and good and self._strays(q, found.q) <= _STRAY:
+                return found.q
+        return None
+
+    def _strays(self, q: Array, goal: Array) -> float:
+        """How far the tool comes off a straight line while the joints go from one configuration to another (m)."""
+        shares = np.linspace(0.0, 1.0, 11)
+        way = np.array([self._robot.kinematics(q + share * (goal - q)).T_odom_tool.translation for share in shares])
+        line = (way[-1] - way[0]) / max(float(np.linalg.norm(way[-1] - way[0])), 1e-9)
+        return float(np.linalg.norm(way - way[0] - np.outer((way - way[0]) @ line, line), axis=1).max())
 
     def _try(self, poses: CutPoses, start: Array, seed: Array) -> Generator[None, None, CutPlan | None]:
         q = start.copy()
@@ -563,13 +604,16 @@ def _quality(plan: CutPlan) -> float:
     return min(plan.joint_margin / _GOOD_MARGIN, 1.0) + min(plan.manipulability / _GOOD_OMEGA, 1.0)
 
 
-def completed(search: Generator[None, None, CutPlan | Unreachable]) -> CutPlan | Unreachable:
+_Result = TypeVar("_Result")
+
+
+def completed(search: Generator[None, None, _Result]) -> _Result:
     """Result of a search, run to its end at once."""
     while True:
         try:
             next(search)
         except StopIteration as end:
-            found: CutPlan | Unreachable = end.value
+            found: _Result = end.value
             return found
 
 
@@ -587,9 +631,10 @@ _AROUND = 0.3
 _THIN, _OWN = 0.005, 0.015
 #: By so much a posture may miss a pose (m).
 _INEXACT = 0.0005
-#: A cane is between the closing blades where its axis comes into a box around the middle of a cut, with these half
-#: sizes along the tool's axes: opening, thickness and reach of the blades with a margin for where it was seen (m).
-_BITE = np.array([0.020, 0.004, 0.022])
+#: Half sizes of the space between the open blades along the tool's axes (m): opening, thickness and reach.
+_BLADES = np.array([0.015, 0.0025, 0.018])
+#: A cane is between the closing blades where its axis comes into that space with a margin for where it was seen (m).
+_BITE = _BLADES + [0.005, 0.0015, 0.004]
 #: No cane farther from the middle of a cut than this (m) comes into that box, with what its bark hides.
 _BESIDE = 0.05
 #: What is known of a cane begins at the bark of its stub, up to so far from the stub's axis (m).
@@ -647,7 +692,8 @@ class CutClearance:
     def tool_too_near(self, poses: CutPoses, point: PruningPoint, spare: bool = True) -> tuple[float, Reason | None]:
         """The same of the tool alone, which no posture of the arm changes, all along its way in.
 
-        A cane that stays, or may stay, must not be between the blades either, though they would pass it open.
+        A cane that stays, or may stay, must not be between the blades either, nor a wire, post, trunk or cordon, though
+        they would pass it open.
 
         Args:
             poses: Of the tool.
@@ -665,7 +711,8 @@ class CutClearance:
         )
         found = self._surroundings.model.tool_distances([pose for _, pose in places], self._within)
         near = [(places[at][0], float(distance), pair) for distance, at, pair in zip(*found, strict=True)]
-        return max(self.bitten(poses.cut, point), self._lacking(near, spare, _INEXACT), key=lambda each: each[0])
+        worst = max(self._taken(poses.cut, point), self._lacking(near, spare, _INEXACT), key=lambda each: each[0])
+        return self._jamming(poses.cut) if worst[1] is None else worst
 
     def tool_room(self, poses: CutPoses, axes: Sequence[Line]) -> float:
         """Least distance of the tool from some canes on its way into a cut (m); infinite from the cane that is cut."""
@@ -714,11 +761,18 @@ class CutClearance:
                 found = reasons.too_near(where, 1e3 * distance, *pair, 1e3 * needed)
         return worst, found
 
-    def bitten(self, T_map_tool: Any, point: PruningPoint) -> tuple[float, Reason | None]:
+    def bitten(self, T_map_tool: Any, point: PruningPoint) -> Reason | None:
+        """What the closing blades would bite on at a pose besides the cut; None where there is nothing.
+
+        Canes that stay, and wires, posts, trunks and cordons: open blades may pass on either side of them.
+        """
+        if not self._settings.collisions:
+            return None
+        return self._taken(T_map_tool, point)[1] or self._jamming(T_map_tool)[1]
+
+    def _taken(self, T_map_tool: Any, point: PruningPoint) -> tuple[float, Reason | None]:
         """A cane that the blades would cut as well at a pose: how far it is in (m), and the reason."""
         worst, found = 0.0, None
-        if not self._settings.collisions:
-            return worst, found
         canes = self._surroundings.canes_near(T_map_tool.translation, _BESIDE)
         joints = {cane.end for cane, _ in canes}
         for capsule, cane in canes:
@@ -731,6 +785,16 @@ class CutClearance:
             if inside > worst:
                 near = reasons.too_near("at the cut", 1e3 * away, BLADES, cane.name, 1e3 * (away + inside))
                 worst, found = inside, near
+        return worst, found
+
+    def _jamming(self, T_map_tool: Any) -> tuple[float, Reason | None]:
+        """A hard part that the blades would close on at a pose: how much of a distance it lacks (m), and the reason."""
+        worst, found = 0.0, None
+        for rigid in self._surroundings.rigid_near(T_map_tool.translation, _BESIDE):
+            gap = _gap_between_blades(rigid, T_map_tool)
+            if _LEAST_ROOM - gap > worst:
+                worst = _LEAST_ROOM - gap
+                found = reasons.too_near("at the cut", 1e3 * gap, BLADES, rigid.name, 1e3 * _LEAST_ROOM)
         return worst, found
 
 
@@ -758,6 +822,18 @@ def _in_box(ends: Array) -> tuple[float, float]:
     inside = np.minimum(_BITE[0] - np.abs(places[:, 0]), _BITE[2] - np.abs(places[:, 2]))
     deepest = int(np.argmax(inside))
     return float(inside[deepest]), float(np.hypot(places[deepest, 0], places[deepest, 2]))
+
+
+def _gap_between_blades(obstacle: Obstacle, T_map_tool: Any) -> float:
+    """Distance of an obstacle from the space between the open blades at a pose (m), negative where it is in it."""
+    start, end = np.array(obstacle.start), np.array(obstacle.end)
+    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), end - start).toRotationMatrix()
+    capsule = pin.coal.Capsule(obstacle.radius, float(np.linalg.norm(end - start)))
+    at_capsule, at_blades = pin.coal.Transform3s(turn, (start + end) / 2), pin.coal.Transform3s()
+    at_blades.setTransform(T_map_tool.rotation, T_map_tool.translation)
+    space = pin.coal.Box(*(2.0 * _BLADES).tolist())
+    request, result = pin.coal.DistanceRequest(), pin.coal.DistanceResult()
+    return float(pin.coal.distance(capsule, at_capsule, space, at_blades, request, result))
 
 
 Found = CutPlan | Unreachable | None

@@ -14,11 +14,11 @@ class Tried(Struct, frozen=True):
     """A try that ended before the blades closed.
 
     Attributes:
-        approach: From where it was.
+        approach: From where it was; None where no picture came, which another approach does not help.
         cane: Axis of the cane that was met (m, map); None where the cut was not reached for another reason.
     """
 
-    approach: Approach
+    approach: Approach | None
     cane: Line | None = None
 
 

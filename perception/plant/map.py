@@ -243,8 +243,15 @@ class KnownSpur:
             self.stubs.append(np.array([*spur.axis.ravel(), spur.radius]))
         if not self.stubs:
             return spur
-        median = np.median(self.stubs, axis=0)
-        return replace(spur, axis=median[:6].reshape(2, 3), radius=float(median[6]))
+        return replace(spur, axis=self.stub, radius=float(np.median([stub[6] for stub in self.stubs])))
+
+    @property
+    def stub(self) -> Array | None:
+        """Both ends of the median stub from the cordon outwards (2×3, m, odom); None where none was measured."""
+        if not self.stubs:
+            return None
+        median: Array = np.median(self.stubs, axis=0)
+        return median[:6].reshape(2, 3)
 
     def as_spur(self) -> Spur:
         """The best observation with the mapped canes that at least half of the observations have shown."""

@@ -23,6 +23,7 @@ from perception.config import RuleConfig
 from perception.plant.model import Cane, Node, Spur
 from perception.rules.keep_out import APPROACH, NO_KEEP_OUT, KeepOut
 from rolling_panda import reasons
+from rolling_panda.commands import SURE
 from rolling_panda.messages.types import CutKind, Reason
 
 #: Shear stress at which a cane parts under a flat-edged blade (Pa): Sessiz, Eliçin and Bayhan, "Cutting force and
@@ -95,12 +96,20 @@ class Decision:
 
 @dataclass(frozen=True)
 class _Keeper:
-    """The cane that stays, why it does, and the number of canes on the spur."""
+    """The cane that stays, why it does, and the number of canes on the spur.
+
+    `turns_on` is the least change of one diameter with which another one would stay (m), where that makes it unsure.
+    """
 
     cane: Cane
     chosen: Literal["only", "lowest", "thickest", "lower", "upper"]
     canes: int
     certainty: float = 1.0
+    turns_on: float | None = None
+
+    def explained(self, cut: Reason) -> Reason:
+        """The reason of a cut, with what its choice turns on."""
+        return cut if self.turns_on is None else reasons.close_choice(cut, 1000 * self.turns_on)
 
 
 def apply_rule(
@@ -178,16 +187,28 @@ def choose_keeper(spur: Spur, config: RuleConfig) -> _Keeper | Reason:
     for limit in (config.preferred_diameter - margin, config.preferred_diameter + margin):
         if _pick(canes, limit) is not keeper:
             return reasons.low_cane_near_limit()
+    turns_on = _turns_on(canes, keeper, config.preferred_diameter)
+    spread = math.hypot(margin, config.shared_diameter_error)
+    certainty = 0.5 * (1.0 + math.erf(turns_on / spread / math.sqrt(2.0)))
+    close = turns_on if certainty < SURE else None
     thick = [cane for cane in canes if 2 * cane.radius >= config.preferred_diameter]
     if keeper not in thick:
         rival = max(cane.radius for cane in canes if cane is not keeper)
         if 2 * (keeper.radius - rival) < margin:
             return reasons.canes_equally_thin()
-        return _Keeper(keeper, "thickest", len(canes))
+        return _Keeper(keeper, "thickest", len(canes), certainty, close)
     clear = min((float(cane.origin[2] - keeper.origin[2]) for cane in thick if cane is not keeper), default=1.0)
     if clear < config.height_error:
         return reasons.canes_at_same_height()
-    return _Keeper(keeper, "lowest", len(canes), float(np.clip(clear / (3 * config.height_error), 0.5, 1.0)))
+    ordered = float(np.clip(clear / (3 * config.height_error), 0.5, 1.0))
+    return _Keeper(keeper, "lowest", len(canes), ordered * certainty, close)
+
+
+def _turns_on(canes: list[Cane], keeper: Cane, least: float) -> float:
+    """Least change of one diameter (m) with which another of `canes` (lowest first) than the keeper would stay."""
+    lower = canes[: next(number for number, cane in enumerate(canes) if cane is keeper)]
+    rival = max(2 * cane.radius for cane in canes if cane is not keeper)
+    return min(2 * keeper.radius - min(least, rival), *(least - 2 * cane.radius for cane in lower), math.inf)
 
 
 def _pick(canes: list[Cane], diameter: float) -> Cane:
@@ -332,7 +353,7 @@ def _shorten(
         confidence=cut_confidence(cane, arc, keeper.certainty, config),
         nodes_seen=len(nodes),
         nodes_kept=kept,
-        reason=_explanation(keeper, 1000 * (arc - last), kept, best - last < config.offset - 1e-9),
+        reason=keeper.explained(_explanation(keeper, 1000 * (arc - last), kept, best - last < config.offset - 1e-9)),
         offset=arc - last,
         node_distance=node_distance(cane, nodes[:kept], cane.at(arc)),
         cane=cane.number,
@@ -379,8 +400,8 @@ def _renew(spur: Spur, keeper: _Keeper, shorten: Cut | Reason, config: RuleConfi
     root, tip = spur.axis
     length = distance(tip, root)
     along = (tip - root) / length
-    keeper_at, keeper_seen = _origin(keeper.cane, root, along)
-    found = [_origin(cane, root, along) for cane in others]
+    keeper_at, keeper_seen = origin(keeper.cane, root, along)
+    found = [origin(cane, root, along) for cane in others]
     nearest, nearest_seen = (min(values) for values in zip(*found, strict=True))
     if nearest < keeper_at or nearest_seen < keeper_seen:
         return left(reasons.cane_below_keeper())
@@ -412,14 +433,14 @@ def _renew(spur: Spur, keeper: _Keeper, shorten: Cut | Reason, config: RuleConfi
         confidence=0.8 * shorten.confidence if isinstance(shorten, Cut) else _DOUBTFUL * keeper.certainty,
         nodes_seen=len(count_nodes(keeper.cane, config)),
         nodes_kept=config.nodes_kept,
-        reason=reasons.renewal_cut(len(others)),
+        reason=keeper.explained(reasons.renewal_cut(len(others))),
         node_distance=node_distance(keeper.cane, keeper.cane.nodes, position),
         cane=keeper.cane.number,
         outward=_free(farthest, lambda shift: keep_out.reason(position + shift * along) is None),
     )
 
 
-def _origin(cane: Cane, root: Array, along: Array) -> tuple[float, float]:
+def origin(cane: Cane, root: Array, along: Array) -> tuple[float, float]:
     """Where the axis of a cane comes out of that of its stub, and where it begins to be seen, from the stub's root (m).
 
     What is seen of a cane begins at the bark of the stub: where it leaves at an angle, farther out than its axis.

@@ -23,6 +23,8 @@ _FALLBACK_RADIUS, _MIN_RADIUS, _MAX_RADIUS = 0.004, 0.001, 0.05
 _MIN_PIXELS, _MAX_DISTANCE = 20, 0.02
 #: Least distance of consecutive axis samples (m).
 _MIN_STEP = 1e-5
+#: Pixels lie at one place if their spread along a line is less than this share of their square distances.
+_LEAST_SPREAD = 1e-9
 #: An end with another cane within this depth beyond it is joined to that cane (m).
 _JOINED = 0.02
 #: Least length of a hidden stretch (m): half a node. The same gap separates two nodes.
@@ -167,7 +169,7 @@ def _project(samples: Array, stations: Array, first: Index, points: Array, k: In
 
 
 def _smooth(stations: Array, along: Array, points: Array, sigma: float) -> Array:
-    """Local linear regression of the surface points over arc length, at each station.
+    """Local linear regression of the surface points over arc length, at each station; NaN where there is none.
 
     Points are averaged in bins first, so that the cost does not grow with their number.
     """
@@ -182,7 +184,10 @@ def _smooth(stations: Array, along: Array, points: Array, sigma: float) -> Array
     # A wide kernel of low weight bridges hidden stretches.
     w += np.exp(-0.5 * (u / (5 * sigma)) ** 2) * 1e-3
     s0, s1, s2 = w.sum(1), (w * u).sum(1), (w * u**2).sum(1)
-    weights = w * (s2[:, None] - s1[:, None] * u) / np.maximum(s0 * s2 - s1**2, 1e-18)[:, None]
+    spread = s0 * s2 - s1**2
+    # Points that all lie at one place along the line have no direction.
+    spread[spread <= _LEAST_SPREAD * s0 * s2] = np.nan
+    weights = w * (s2[:, None] - s1[:, None] * u) / spread[:, None]
     out: Array = weights @ p
     return out
 

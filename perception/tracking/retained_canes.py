@@ -17,7 +17,7 @@ from perception.arrays import Array, Labels, distance, interpolate
 from perception.config import ObstacleConfig, RuleConfig
 from perception.plant.map import KnownCane, KnownSpur
 from perception.plant.numbering import SpurNumber
-from perception.rules.pruning import count_nodes, miscount_reason
+from perception.rules.pruning import count_nodes, miscount_reason, origin
 from perception.segmentation.frame import View
 from perception.tracking.presence import wood_presence
 from perception.tracking.tracker import Proposal
@@ -56,7 +56,9 @@ class _Cane:
         cut: Arc length of its lowest proposed cut (m), also after the cut was made; infinite without one.
         keeper: Whether the rule chose it.
         axis: Published axis, K×3 in odom (m), `_SPACING` apart; None while it is not published.
+        begin: Published place where its axis meets that of its stub (3, m, odom); None where that is not published.
         radius: Published radius (m).
+        undecided: Whether it is published as one of an undecided site.
         capsules: Published capsules.
         gone: Consecutive frames that showed it gone.
         observations: Of the map.
@@ -66,7 +68,9 @@ class _Cane:
     cut: float = np.inf
     keeper: bool = False
     axis: Array | None = None
+    begin: Array | None = None
     radius: float = 0.0
+    undecided: bool = False
     capsules: tuple[Capsule, ...] = field(default=())
     gone: int = 0
     observations: int = 0
@@ -138,6 +142,7 @@ class RetainedCanes:
             canes = [self._canes.setdefault((spur.number, k), _Cane()) for k in range(len(spur.canes))]
             arcs: dict[int, float] = {}
             chosen: set[int] = set()
+            stub = spur.stub if any(cut.kind == "renewal cut" for cut in here) else None
             for cut in here:
                 k, gap, arc = spur.nearest_cane(cut.position)
                 if cut.kind == "renewal cut":
@@ -163,7 +168,8 @@ class RetainedCanes:
                     cane.withdraw()
                 else:
                     undecided = rule.system == "spur" and not decided
-                    _publish(cane, known, _retained_length(cane, known, rule), spur.number, undecided)
+                    begin = None if stub is None or known.number not in chosen else _begin(known, stub)
+                    _publish(cane, known, begin, _retained_length(cane, known, rule), spur.number, undecided)
 
 
 def _check_presence(cane: _Cane, view: View, labels: Labels) -> None:
@@ -189,7 +195,16 @@ def _retained_length(cane: _Cane, known: KnownCane, rule: RuleConfig) -> float:
     return rule.basal_bud_distance + kept * _MAX_INTERNODE
 
 
-def _publish(cane: _Cane, known: KnownCane, end: float, number: SpurNumber, undecided: bool) -> None:
+def _begin(known: KnownCane, stub: Array) -> Array:
+    """Where the axis of a cane meets that of its stub (3, m); the stub hides the cane up to its bark or farther."""
+    along = (stub[1] - stub[0]) / max(distance(stub[1], stub[0]), 1e-9)
+    out: Array = stub[0] + origin(known.as_cane(), stub[0], along)[0] * along
+    return out
+
+
+def _publish(
+    cane: _Cane, known: KnownCane, begin: Array | None, end: float, number: SpurNumber, undecided: bool
+) -> None:
     """Replace the capsules of a cane where they differ by more than the tolerances."""
     axis, radius = _sampled(known, end), float(known.radius.mean[0])
     if distance(axis[-1], axis[0]) < _MIN_LENGTH:
@@ -197,14 +212,18 @@ def _publish(cane: _Cane, known: KnownCane, end: float, number: SpurNumber, unde
         return
     if (
         cane.axis is not None
-        and cane.capsules[0].undecided == undecided
+        and cane.undecided == undecided
+        and _near(begin, cane.begin)
         and abs(radius - cane.radius) < _RADIUS_TOLERANCE
         and _hausdorff(axis, cane.axis) < _POSITION_TOLERANCE
     ):
         return
-    cane.axis, cane.radius = axis, radius
+    cane.axis, cane.begin, cane.radius, cane.undecided = axis, begin, radius, undecided
     corners = _simplify(axis)
     pieces = [(start, stop, undecided) for start, stop in zip(corners, corners[1:], strict=False)]
+    if begin is not None:
+        # The stub hides it there, and shears that cut the stub must not close on it.
+        pieces.insert(0, (begin, axis[0], True))
     # What hides the end of a cane does not end it; where it goes is not sure.
     rest = min(end - known.best.length, _LONGEST_HIDDEN)
     if rest > 0.0 and known.best.end == "hidden" and np.isinf(known.cut_at):
@@ -214,6 +233,12 @@ def _publish(cane: _Cane, known: KnownCane, end: float, number: SpurNumber, unde
         Capsule("cane", vector3(start), vector3(stop), radius, radius, number.vine, number.spur, unsure, known.number)
         for start, stop, unsure in pieces
     )
+
+
+def _near(one: Array | None, other: Array | None) -> bool:
+    if one is None or other is None:
+        return one is other
+    return distance(one, other) < _POSITION_TOLERANCE
 
 
 def _sampled(known: KnownCane, end: float) -> Array:

@@ -125,7 +125,8 @@ the share of the class's pixels that were given it.
 
 {_table(scores)}
 
-Canes are drawn {wider:+.2f} pixels wider than they are in the mean. This is subtracted when they are measured.
+On average canes are drawn {abs(wider):.2f} pixels {"wider" if wider > 0 else "narrower"} than they are.
+Measured widths are corrected by that.
 
 Limits: all that it has seen was rendered. Weeds, snow, people and machines were not in it. It has not been scored on
 photographs.

@@ -17,6 +17,7 @@ from bridge.sim import build
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
 from bridge.sim.vineyard.row import Row
+from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.errors import InputError
@@ -136,6 +137,15 @@ def test_a_cut_that_changes_at_the_press_is_refused_and_asked_again():
     assert told(page) == ["a", "b", "c", "d", "b"] and reviewer.refusals == {"b": "point_unseen"}
 
 
+def test_a_place_keeps_the_reason_for_which_it_was_left_whatever_is_cut_beside_it():
+    page = Page([], [place(3)])
+    reviewer = bench.Reviewer(page, 1.0, "each")
+    reviewer.decide()
+    page.sites = [msgspec.structs.replace(place(3), reason=reasons.pruned_already(0.0, 2.0))]
+    reviewer.decide()
+    assert reviewer.left == [place(3)] and reviewer.decisions == 1
+
+
 def test_few_cuts_are_decided_one_by_one():
     page = Page([at("a", 1, 1), at("b", 1, 2)], [place(3)])
     reviewer = bench.Reviewer(page, 1.0, "vine", 0.5)
@@ -181,7 +191,8 @@ def test_every_cut_that_the_vine_asks_for_has_one_outcome_with_its_reason():
     site = m.UndecidedSite(
         reason=reasons.cane_end_unclear(), needs="operator", vine=1, spur=9, position=tuple(stub.end.tolist())
     )
-    found = bench.places(ROW, WANTED, [bite(right), bite(harmed, -0.06)], reviewer, ends, [site])
+    earlier = msgspec.structs.replace(site, reason=reasons.cane_base_hidden())
+    found = bench.places(ROW, WANTED, [bite(right), bite(harmed, -0.06)], reviewer, ends, [earlier, site])
     assert len(found) == sum(each.cut is not None for each in WANTED)
     outcome = {(each.spur, each.kind): (each.outcome, each.reason) for each in found}
     assert outcome[right.spur, "spur cut"] == ("right", "")
@@ -202,6 +213,52 @@ def test_of_a_guyot_vine_both_canes_of_the_spur_are_asked_for_and_its_stub_stays
     assert [each.outcome for each in found] == ["right", "right"]
     piece = {"vine": 0, "spur": 0, "cane": STUB, "kind": "spur", "point": [0.0, 0.0, 0.0]}
     assert "stays" in bench.true_cut([stub], [piece]).harm
+
+
+class Stopping:
+    """A loop whose work ends in protective stops, and goes on after each has been acknowledged and resumed."""
+
+    def __init__(self, stops, cause_s):
+        self.now, self.stops, self.cause_s = 0.0, stops, cause_s
+        self.controller = SimpleNamespace(mode="READY")
+        self.stopped_at, self.starts = 0.0, 0
+
+    def queue(self, *states):
+        return iter(())
+
+    def run(self, seconds):
+        self.now += seconds
+
+    def run_until(self, condition, limit_s):
+        if self.controller.mode == "AUTO":
+            self.now += 5.0
+            self.controller.mode = "PROTECTIVE_STOP" if self.stops else "READY"
+            self.stops, self.stopped_at = max(self.stops - 1, 0), self.now
+        end = self.now + limit_s
+        while not condition() and self.now < end:
+            self.now += 0.5
+
+    def command(self, asked):
+        mode = self.controller.mode
+        if isinstance(asked, intents.Start) and mode == "READY" and self.starts < 9:
+            self.controller.mode, self.starts = "AUTO", self.starts + 1
+        elif isinstance(asked, intents.Acknowledge) and self.now > self.stopped_at + self.cause_s:
+            self.controller.mode = "PAUSED"
+        elif isinstance(asked, intents.Resume) and mode == "PAUSED":
+            self.controller.mode = "READY"
+        return m.Answer(ok=self.controller.mode != mode)
+
+
+@pytest.mark.parametrize(("stops", "cause_s", "acknowledged"), [(0, 0.0, 0), (2, 22.0, 2), (1, 60.0, 0), (9, 0.0, 4)])
+def test_a_person_looks_at_a_protective_stop_and_the_work_goes_on(monkeypatch, stops, cause_s, acknowledged):
+    monkeypatch.setattr(bench, "row_of", lambda loop: None)
+    loop = Stopping(stops, cause_s)
+    clock = SimpleNamespace(begin=lambda now: None, end=lambda now: None)
+    visit = bench.Visit(loop, bench.Reviewer(loop, 1.0, "vine"), clock, 1.0)
+    visit.work()
+    assert visit.stops == acknowledged and loop.starts == 1 + acknowledged
+    assert visit.stages["decisions"] >= 20.0 * acknowledged
+    assert loop.controller.mode == ("READY" if acknowledged == stops else "PROTECTIVE_STOP")
 
 
 # --- the figures ------------------------------------------------------------------------------------------------------

@@ -66,12 +66,14 @@ def release(stop_id: str = "s1") -> m.ReleaseStop:
 @pytest.mark.alone  # It counts what comes in real time.
 def test_telemetry_comes_at_its_rates_with_growing_sequences(rig: Rig) -> None:
     rig.run(2.0, REST)
+    # A real bridge that the machine holds up skips its steps, and the messages that were due in them.
+    told_s = 2.0 - rig.skipped_s
     joints = [out.joints.sequence for out in rig.outputs if out.joints]
     odometry = [out.odometry.sequence for out in rig.outputs if out.odometry]
     frames = [out.frame.sequence for out in rig.outputs if out.frame]
-    assert len(joints) == pytest.approx(200, abs=6)
-    assert len(odometry) == pytest.approx(100, abs=4)
-    assert len([out for out in rig.outputs if out.state]) == pytest.approx(41, abs=5)
+    assert len(joints) == pytest.approx(100 * told_s, abs=6)
+    assert len(odometry) == pytest.approx(50 * told_s, abs=4)
+    assert len([out for out in rig.outputs if out.state]) == pytest.approx(20 * told_s + 1, abs=5)
     assert len(frames) >= 2
     for sequences in (joints, odometry, frames):
         assert sequences == sorted(set(sequences))

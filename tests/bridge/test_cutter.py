@@ -80,6 +80,15 @@ def test_a_wire_beside_the_blade_plane_does_not_jam() -> None:
     assert not close_blades(Row((upright(), along_row("wire", 1.01, 0.00125))), TOOL, CONFIG).jammed
 
 
+@pytest.mark.parametrize(("gap", "jams"), [(0.002, False), (-0.002, True)])
+def test_a_post_beside_a_corner_of_the_blades_jams_them_only_where_it_reaches_it(gap: float, jams: bool) -> None:
+    corner = np.array([CONFIG.opening / 2, CONFIG.blade_half_length])
+    x, y = corner + (0.038 + gap) * np.sqrt(0.5)
+    result = close_blades(Row((upright(), upright(x, y, 0.038, "post"))), TOOL, CONFIG)
+    assert result.jammed == jams
+    assert bool(result.severed) != jams
+
+
 def test_nothing_at_all_is_nothing() -> None:
     assert close_blades(Row(()), TOOL, CONFIG).detail == reasons.nothing_between_blades()
 

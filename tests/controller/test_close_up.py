@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from controller.work.close_up import CloseUpClient
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.messages.perception import CloseUpResult, Finding
 
 
@@ -61,6 +63,36 @@ def test_a_lost_picture_is_asked_for_anew_and_a_look_ends_whatever_comes() -> No
     assert client.answer("a", 4.9) is None
     answer = client.answer("a", 5.1)
     assert answer is not None and answer.finding == "unseen" and answer.reason.code == "no_close_up"
+
+
+@pytest.mark.parametrize(
+    ("findings", "answer"),
+    [(["unseen"], ("unseen", "cane_hidden")), (["changed"], ("unseen", "no_close_up"))],
+    ids=["nothing to be seen", "one that contradicts"],
+)
+def test_on_a_slow_machine_the_pictures_that_came_in_time_count(
+    findings: list[Finding], answer: tuple[Finding, str]
+) -> None:
+    client = CloseUpClient(5.0, 2, 4)
+    client.ask("a", "seen", 0.0)
+    for number, finding in enumerate(findings, 1):
+        client.update(replace(look(number, finding), reason=reasons.cane_hidden()), 3.0)
+    assert client.answer("a", 4.9) is None
+    found = client.answer("a", 5.1)
+    assert found is not None and found.reason is not None and (found.finding, found.reason.code) == answer
+
+
+def test_on_a_slow_machine_a_cane_that_sways_is_where_the_pictures_that_came_in_time_show_it() -> None:
+    client = CloseUpClient(5.0, 2, 4)
+    client.ask("a", "seen", 0.0, np.array([0.5, 0.75, 1.0]))
+    for at, x in ((2.0, 0.52), (3.5, 0.49)):
+        request = client.due(at)
+        assert request is not None
+        client.update(replace(look(request[0]), position=(x, 0.75, 1.0)), at)
+    assert client.answer("a", 4.9) is None
+    found = client.answer("a", 5.1)
+    assert found is not None and found.finding == "seen"
+    assert found.position == pytest.approx(((0.52 + 0.49 + 0.5) / 3, 0.75, 1.0))
 
 
 def test_two_points_are_looked_at_at_once_and_what_nobody_asked_for_is_nobodys() -> None:

@@ -238,6 +238,22 @@ def test_what_close_ups_do_not_show_is_looked_at_from_other_sides_and_then_left(
     )
 
 
+def test_the_other_side_is_looked_at_from_there_where_no_other_cut_is_left():
+    r = working((point("a", (0.5, 0.75, 1.0)),))
+    usual, sides = r.close_up, {}
+
+    def hidden(request):
+        found, missed = usual(request), sum("tried again another way" in event for event in r.events)
+        if found.finding == "seen":
+            sides.setdefault(missed, r.model.kinematics(r.q).T_odom_tool.rotation[:, 2])
+        return found if missed == 2 or found.finding != "seen" else msgspec.structs.replace(found, finding="unseen")
+
+    r.close_up = hidden
+    finish(r, 60.0)
+    assert [cut[0] for cut in r.cuts] == ["a"] and len(sides) == 3
+    assert all(sides[one] @ sides[other] < 0.995 for one, other in ((0, 1), (0, 2), (1, 2))), sides
+
+
 @pytest.mark.parametrize(("dx", "told"), [(0.004, False), (0.02, True)])
 def test_the_place_of_the_close_up_is_cut_and_the_log_says_how_far_it_is_from_the_accepted_one(dx, told):
     r = looking(working((point("a", (0.5, 0.75, 1.0)),)), dx=dx)
@@ -287,7 +303,24 @@ def test_the_phase_is_told_while_the_robot_looks_and_the_blades_stay_out_of_the_
     for _ in range(150):
         r.step()
     assert r.state.phase == "CLOSE_UP" and r.state.T_odom_tool.position[1] < 0.75 - 0.19
-    finish(r, 40.0)
-    assert not r.cuts and entry(r, "a").reason == reasons.acceptance_void(
-        reasons.unseen_in_close_up(reasons.no_close_up(8.0))
-    )
+    finish(r, 70.0)
+    unseen = reasons.unseen_in_close_up(reasons.no_close_up(8.0))
+    assert not r.cuts and entry(r, "a").reason == reasons.acceptance_void(unseen)
+    assert sum(event.startswith("a: ") and event.endswith("The cut is tried again") for event in r.events) == 2
+
+
+def test_a_cut_whose_close_up_did_not_come_is_made_at_the_next_try_from_the_same_side():
+    r = working((point("a", (0.5, 0.75, 1.0)),))
+    usual, axes = r.close_up, {}
+
+    def late(request):
+        found, missed = usual(request), any("The cut is tried again" in event for event in r.events)
+        if found.finding != "seen":
+            return found
+        axes[missed] = r.model.kinematics(r.q).T_odom_tool.rotation[:, 2]
+        return found if missed else None
+
+    r.close_up = late
+    finish(r, 60.0)
+    assert [cut[0] for cut in r.cuts] == ["a"] and entry(r, "a").state == "DONE"
+    assert axes[False] @ axes[True] > 0.9995

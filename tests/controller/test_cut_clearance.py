@@ -4,11 +4,14 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from bridge.config import BridgeConfig
+from bridge.sim.robot.cutter import close_blades
+from bridge.sim.vineyard.row import Rod, Row
 from controller.config import ControllerConfig
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.collision_geometry import TOOL
 from controller.whole_body.obstacle import Axes, Obstacle
-from controller.work.posture_search import CutClearance, CutPlan, PostureSearch, Unreachable, completed
+from controller.work.posture_search import CutClearance, CutPlan, PostureSearch, Unreachable, completed, cut_poses
 from controller.work.tries import Tried
 from rolling_panda import messages as m
 from rolling_panda.messages.perception import Capsule, Obstacles
@@ -136,6 +139,37 @@ def test_blades_do_not_lean_into_what_the_bark_hides_of_the_cane_that_stays(towa
     seen = Capsule("cane", tuple(start.tolist()), whole.end, 0.004, 0.004, 1, 1)
     plan = find(seen, tangent=(0.0, 0.0, 1.0), kind="renewal cut")
     assert isinstance(plan, Unreachable) or not bitten(plan, whole)
+
+
+@pytest.mark.parametrize("tangent", [(0.278, -0.035, 0.96), (-0.3, 0.1, 1.0), (0.5, 0.0, 1.0)])
+@pytest.mark.parametrize("up", [-0.0065, 0.004, 0.0065])
+def test_blades_that_lean_do_not_close_on_a_wire_that_they_pass_while_open(tangent, up):
+    near = wire(POINT[2] + up, POINT[1] + 0.018)
+    plan = find(near, tangent=tangent)
+    if isinstance(plan, Unreachable):
+        lacking = dict(dict(plan.reason.values)["near"].values)
+        assert lacking["part"] in ("blades", "cutter") and "wire" in lacking["other"]
+        return
+    rod = Rod("wire", np.array(near.start), np.array(near.end), near.start_radius, near.end_radius)
+    assert not close_blades(Row((rod,)), plan.poses.cut.homogeneous, BridgeConfig()).jammed
+
+
+def test_another_approach_is_found_where_the_usual_one_would_close_on_a_wire():
+    near = wire(POINT[2] + 0.0065, POINT[1] + 0.018)
+    assert isinstance(find(near, tangent=(0.278, -0.035, 0.96)), CutPlan)
+
+
+@pytest.mark.parametrize(("gap", "bites"), [(0.003, False), (-0.001, True)])
+def test_a_post_beside_a_corner_of_the_blades_counts_only_where_it_reaches_between_them(gap, bites):
+    """The blades' space ends 15 mm to the side of the cut and 18 mm ahead of it."""
+    at = POINT + np.array([0.015, 0.018, 0.0]) + (0.04 + gap) * np.sqrt(0.5) * np.array([1.0, 1.0, 0.0])
+    low, high = (tuple((at + [0.0, 0.0, z]).tolist()) for z in (-0.5, 0.5))
+    clearance = CutClearance(RobotModel(), SETTINGS)
+    post = Capsule("post", low, high, 0.04, 0.04)
+    clearance.update(Received(Obstacles(header=m.Header(0.0, "odom"), capsules=(post,)), 0.0))
+    cut = point("p1", tuple(POINT.tolist()), (0.0, 0.0, 1.0), vine=1, spur=1)
+    square = cut_poses(POINT, np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0]), 0.1, 0.2)
+    assert (clearance.bitten(square.cut, cut) is not None) == bites
 
 
 def test_a_stub_that_cannot_be_cut_without_the_cane_that_stays_is_refused():

@@ -287,6 +287,15 @@ def test_a_guard_that_cannot_be_kept_is_named_and_given_way_to_as_little_as_poss
     assert (ROBOT.kinematics(q).J_xi @ out.xi)[0] < 0.9 * best
 
 
+@pytest.mark.parametrize(("speed", "told"), [(0.0015, "blades and post 3"), (0.01, "")])
+def test_what_slows_a_motion_to_a_crawl_is_told(speed, told):
+    q = home()
+    method = Hierarchy(ROBOT, CONFIG.whole_body, DT, guards=(_Wall(speed),))
+    out = settled(method, lambda sent: ik_problem(q, sent=sent))
+    assert out.scale == pytest.approx(speed / 0.05, rel=0.1) and out.feasible
+    assert out.reason == told
+
+
 def test_before_a_wall_a_path_is_kept_and_says_what_holds_it_while_a_hand_slides_along():
     q = home()
     J = ROBOT.kinematics(q).J_xi

@@ -21,8 +21,12 @@ CONFIG = ControllerConfig()
 ASIDE = (-2.2, -0.1128, -0.0354, -2.0055, 1.6759, 1.2124, -0.269)
 
 
-def homing(*obstacles: Capsule) -> KinematicRobot:
-    robot = KinematicRobot(Controller(CONFIG, RobotConfig()), ASIDE)
+#: Clear of the canes but for the room to turn, with the wrist near the axis of joint 1.
+SINGULAR = (-0.93, -0.46, 1.09, -0.8, 1.89, 1.22, 0.12)
+
+
+def homing(*obstacles: Capsule, posture: tuple[float, ...] = ASIDE) -> KinematicRobot:
+    robot = KinematicRobot(Controller(CONFIG, RobotConfig()), posture)
     robot.obstacles = obstacles
     robot.run(0.1)
     assert robot.ask(intents.Arm(user="ada")).ok
@@ -52,3 +56,13 @@ def test_a_post_in_the_way_stops_it_before_it_is_met_and_is_named() -> None:
     assert any("Homing was stopped" in event and "post" in event for event in robot.events), robot.events
     assert np.abs(robot.xi).max() < 1e-3
     assert robot.controller.mode == "READY"
+    # The page does not go on to say that the arm is on its way.
+    assert robot.state is not None and robot.state.reason.code == "homing_blocked"
+
+
+def test_near_a_singularity_it_turns_home_by_its_joints_once_clear_of_the_canes() -> None:
+    """The straight way back would need ever quicker turns of joint 1."""
+    robot = homing(posture=SINGULAR)
+    robot.run(12.0)
+    np.testing.assert_allclose(robot.q[ARM_Q], CONFIG.work.home, atol=0.012)
+    assert text_of(reasons.arm_home()) in robot.events

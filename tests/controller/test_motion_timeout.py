@@ -2,13 +2,15 @@
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from controller.motion.follower import MotionTimeout, Tracking, missed
 from controller.work import cutting
+from rolling_panda import commands as intents
 from rolling_panda import reasons
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.reasons import text_of
-from tests.support.controller_at_work import entry, finish, run_until, working
+from tests.support.controller_at_work import entry, finish, robot, run_until, working
 from tests.support.points import point
 
 TIMEOUT, DT = 6.0, 0.01
@@ -113,3 +115,37 @@ def test_a_camera_place_that_the_base_does_not_come_to_is_left_and_the_cut_tried
     tries.append(1)
     finish(r, 60.0)
     assert entry(r, "a").state == "DONE" and len(r.cuts) == 1
+
+
+def test_a_way_on_which_the_tool_hardly_gets_on_is_tried_another_way(monkeypatch):
+    """Near a singularity the motion is possible, and takes for ever."""
+    track = cutting.FollowedMotion.track
+
+    def crawling(way, robot):
+        # The robot does not get on.
+        done = replace(track(way, robot), reason="joint 1", feasible=True, scale=0.015)
+        way.timeout.note(done)
+        return replace(done, xi=np.zeros(9))
+
+    r = working((point("a", (0.3, 0.785, 1.169)),))
+    run_until(r, lambda s: s is not None and s.phase == "APPROACH", 10.0)
+    monkeypatch.setattr(cutting.FollowedMotion, "track", crawling)
+    run_until(r, lambda s: entry(r, "a").reason is not None, 30.0)
+    assert entry(r, "a").state == "ACCEPTED" and entry(r, "a").reason.code == "missed_once"
+
+
+@pytest.mark.long
+def test_an_arm_that_came_in_another_posture_than_planned_is_brought_into_it_before_the_canes():
+    """Both cuts turned far about canes that lean: without that the second one is not reached in three tries."""
+    near = (point("a", (0.5, 0.746, 0.954), tangent=(-0.16, 0.36, 0.92)),)
+    far = point("b", (0.561, 0.734, 1.055), tangent=(0.29, -0.54, 0.79))
+    r = robot()
+    r.step()
+    r.show((*near, far))
+    r.step()
+    turned = [intents.SetApproach(user="ada", point_id=name, azimuth=-0.7) for name in "ab"]
+    for intent in (intents.Arm(user="ada"), intents.AcceptAll(user="ada"), *turned, intents.Start(user="ada")):
+        assert r.ask(intent).ok
+    finish(r, 60.0)
+    assert [cut[0] for cut in r.cuts] == ["a", "b"]
+    assert entry(r, "b").state == "DONE"

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pinocchio as pin
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from controller.motion.tool_motion import Correction, PoseTrajectory, Progress, Rates, quintic
+from controller.motion.rest_to_rest import Progress, Rates
+from controller.motion.tool_motion import Correction, PoseTrajectory
 
 TRANSLATION, ROTATION = Rates(0.3, 0.6, 4.0), Rates(0.8, 1.8, 12.0)
 seeds = st.integers(0, 2**32 - 1)
@@ -15,41 +15,6 @@ seeds = st.integers(0, 2**32 - 1)
 def poses(seed):
     rng = np.random.default_rng(seed)
     return [pin.SE3(pin.exp3(rng.uniform(-1, 1, 3)), rng.uniform(-1, 1, 3)) for _ in range(2)]
-
-
-def derivative(f, t, step=1e-5):
-    return (f(t + step) - f(t - step)) / (2 * step)
-
-
-@given(st.floats(0.1, 20), st.floats(0.02, 0.98))
-def test_quintic_derivatives_agree_with_its_position(duration, share):
-    t = share * duration
-    at = quintic(t, duration)
-    step = 1e-5 * duration
-    assert at.rate == pytest.approx(derivative(lambda u: quintic(u, duration).s, t, step), rel=1e-6)
-    assert at.acceleration == pytest.approx(derivative(lambda u: quintic(u, duration).rate, t, step), abs=1e-5)
-
-
-def test_quintic_starts_and_ends_at_rest_and_stays_there():
-    for t, s in ((-1.0, 0.0), (0.0, 0.0), (2.0, 1.0), (5.0, 1.0)):
-        at = quintic(t, 2.0)
-        assert (at.s, at.rate, at.acceleration) == (s, 0.0, 0.0)
-
-
-@given(st.floats(1e-4, 5.0))
-def test_duration_keeps_all_three_bounds_and_uses_one_of_them(distance):
-    T = TRANSLATION.duration(distance)
-    t = np.linspace(0, T, 2001)
-    rate = np.array([quintic(u, T).rate for u in t]) * distance
-    acceleration = np.array([quintic(u, T).acceleration for u in t]) * distance
-    jerk = np.abs(np.diff(acceleration)) / (t[1] - t[0])
-    used = (
-        rate.max() / TRANSLATION.velocity,
-        np.abs(acceleration).max() / TRANSLATION.acceleration,
-        jerk.max() / TRANSLATION.jerk,
-    )
-    assert max(used) <= 1.001
-    assert max(used) > 0.98
 
 
 @settings(max_examples=25, deadline=None)
@@ -96,7 +61,7 @@ places = st.tuples(*[st.floats(-0.01, 0.01)] * 3)
 @given(places, st.floats(0.0, 5.0))
 def test_it_keeps_its_bounds_and_is_all_there_at_its_end(by, begin):
     made = Correction.within(begin, np.array(by), np.zeros(2), RATES)
-    size, dt = float(np.linalg.norm(by)), made.duration / 1000
+    size, dt = float(np.linalg.norm(by)), made.law.duration / 1000
     times = begin + np.arange(-10, 1011) * dt
     way = size * np.array([made.progress(time).s for time in times])
     speed = size * np.array([made.progress(time).rate for time in times])

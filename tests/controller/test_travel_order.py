@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from controller.config import ControllerConfig
-from controller.motion.tool_motion import PEAK_VELOCITY, ToolMotion
-from controller.planning.cuts import length, shortest, travel_times
+from controller.motion.tool_motion import ToolMotion
+from controller.planning.cuts import leaving_times, length, shortest, travel_times
 from controller.work.cutting import ApproachSegments
 from controller.work.posture_search import CutClearance, PostureSearch, completed
 from rolling_panda.model.robot import ARM_Q, RobotModel
@@ -29,9 +29,9 @@ def test_a_motion_takes_as_long_as_the_slowest_of_base_arm_and_tool() -> None:
     times = travel_times(CONFIG, True, (TOOL, START), CUTS)
     assert times.shape == (4, 3)
     np.testing.assert_allclose(np.diag(times[1:]), 0.0, atol=0.05)
-    # A metre of the base, by the quintic that it follows.
+    # A metre more of the base, which cruises with a margin for feedback.
     assert times[1, 1] > 1.0 / CONFIG.whole_body.base_speed
-    assert times[1, 2] - times[1, 1] == pytest.approx(PEAK_VELOCITY / (0.8 * CONFIG.whole_body.base_speed), rel=0.01)
+    assert times[1, 2] - times[1, 1] == pytest.approx(1.0 / (0.8 * CONFIG.whole_body.base_speed), rel=0.01)
     slow = controller_config(CONFIG, whole_body__base_speed=0.5 * CONFIG.whole_body.base_speed)
     assert travel_times(slow, True, (TOOL, START), CUTS)[1, 1] > 1.5 * times[1, 1]
 
@@ -64,3 +64,17 @@ def test_on_a_line_the_order_is_the_best_of_all() -> None:
         costs = np.abs(places[:, None] - places[None, 1:])
         best = min(length(costs, list(p)) for p in itertools.permutations(range(7)))
         assert length(costs, shortest(costs)) == pytest.approx(best)
+
+
+def test_work_ends_ahead_where_the_row_goes_on() -> None:
+    """From the middle of three cuts the nearer end comes first; where both are as near, the one behind."""
+    start = START.copy()
+    start[0] = CUTS[1].q_cut[0]
+    tool = ROBOT.pose(start, ROBOT.tool_id).copy()
+    costs = travel_times(CONFIG, True, (tool, start), CUTS)
+    leaving = leaving_times(CONFIG, start, CUTS)
+    np.testing.assert_allclose(leaving, np.array([2.0, 1.0, 0.0]) / CONFIG.whole_body.base_speed, atol=0.5)
+    assert shortest(costs, leaving)[-1] == 2
+    # Where the row goes on in the other direction, at the other end.
+    back = controller_config(CONFIG, work__row_heading=np.pi)
+    assert shortest(costs, leaving_times(back, start, CUTS))[-1] == 0

@@ -244,6 +244,35 @@ def test_a_diameter_seen_often_leaves_less_in_doubt():
     assert once == reasons.low_cane_near_limit(), "one of them was seen once only"
 
 
+@pytest.mark.parametrize(
+    ("low", "high", "turns_on"),
+    [
+        (0.0031, 0.0045, 0.2),  # The low one is hardly thick enough.
+        (0.0029, 0.0045, 0.2),  # It is hardly too thin.
+        (0.0028, 0.0027, 0.2),  # Both are too thin, and about as thick.
+        (0.00305, 0.00295, 0.2),  # A little thinner, the low one would still be the thickest.
+        (0.00308, 0.00225, None),  # So it would be in any case here.
+        (0.0032, 0.0045, None),
+        (0.0028, 0.0045, None),
+        (0.0028, 0.0024, None),
+        (0.0038, 0.0040, None),
+        (0.0026, 0.00292, None),  # The high one stays whether it is thick enough or not.
+    ],
+)
+def test_a_choice_that_little_thickness_turns_over_is_unsure_and_says_so(low, high, turns_on):
+    """So nobody accepts it with all sure cuts of a vine at once."""
+    canes = [cane(radius=low, base=(0.02, 0.0, 0.93)), cane(radius=high, base=(0.0, 0.0, 0.99))]
+    cuts = apply_rule(spur(*(replace(each, observations=9) for each in canes)), RULE).cuts
+    assert cuts
+    for cut in cuts:
+        told = dict(cut.reason.values).get("difference_mm")
+        assert (told is None) == (turns_on is None), cut.reason
+        if turns_on is not None:
+            assert told == pytest.approx(turns_on) and cut.confidence < SURE
+        elif cut.kind == "spur cut":
+            assert cut.confidence >= SURE
+
+
 def test_a_cane_that_runs_into_another_is_cut_where_enough_of_it_is_seen_and_a_pruned_one_never_again():
     going_on = cane(nodes=(0.02, 0.10, 0.18), length=0.212, end="hidden")
     assert cut_arc(going_on, RULE) == pytest.approx(0.20)

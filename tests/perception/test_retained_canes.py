@@ -291,3 +291,30 @@ def test_of_too_many_the_nearest_canes_are_told_in_an_order_that_stays():
     elsewhere = replace(view(), t=np.array([0.3, 0.0, 0.9]))
     assert told(plants, staying=staying, seen=elsewhere) == everything
     assert told(plants, staying=staying, seen=elsewhere, most=1) == everything[:1]
+
+
+def test_of_the_cane_that_stays_on_a_stub_the_hidden_base_is_told():
+    """It is seen from 20 mm beside the stub on, and comes out of it below."""
+    arc = np.linspace(0.0, 0.35, 71)
+    beside = np.array([0.02, -0.01, 0.0])
+    seen = Cane(BASE + beside + arc[:, None] * UP, arc, 0.004, tuple(Node(node, 30) for node in NODES), (), "free", 0.0)
+    leaning = replace(seen, axis=seen.axis + 0.5 * np.minimum(arc, 0.05)[:, None] * [1.0, 0.0, 0.0])
+    stub = np.array([BASE, BASE + 0.05 * UP])
+    plants = PlantMap()
+    for _ in range(3):
+        plants.update(Plant((Spur(BASE, stub, 0.007, (leaning, cane(-0.02))),), np.zeros((0, 3)), ()), (NUMBER,))
+    number = next(each.number for each in plants.spurs[0].canes if each.best.axis[0, 0] > 0.0)
+    renewal = Cut("renewal cut", BASE + 0.03 * UP, UP, 0.007, 0.9, 4, 2, "Because.", cane=number)
+    shorten = Cut("spur cut", leaning.at(0.2), UP, 0.004, 0.9, 4, 2, "Because.")
+    staying = RetainedCanes(CONFIG)
+    without = told(plants, Proposal(shorten, NUMBER), staying=staying)
+    hidden, *rest = told(plants, Proposal(shorten, NUMBER), Proposal(renewal, NUMBER), staying=staying)
+    assert [(each.start, each.end) for each in rest] == [(each.start, each.end) for each in without]
+    assert hidden.undecided and hidden.end == rest[0].start and hidden.cane == rest[0].cane
+    begin = np.array(hidden.start) - BASE
+    # On the stub, where the cane leads back to.
+    assert np.linalg.norm(begin - (begin @ UP) * UP) < 1e-6 and -0.01 <= begin @ UP < 0.01
+    # It goes with the renewal cut.
+    staying = RetainedCanes(CONFIG)
+    assert len(told(plants, Proposal(shorten, NUMBER), Proposal(renewal, NUMBER), staying=staying)) == 1 + len(without)
+    assert told(plants, Proposal(shorten, NUMBER), staying=staying) == without

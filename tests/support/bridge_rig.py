@@ -139,6 +139,11 @@ class Rig(Commander):
         self.held_up += max(0.0, now - since - _IN_TIME_S)
         return now
 
+    @property
+    def skipped_s(self) -> float:
+        """Time whose steps the bridge has skipped in the last run, as the machine held it up (s)."""
+        return self.held_up if self.parts.real else 0.0
+
     def comes_to_rest(self, xi: tuple[float, ...] | None) -> bool:
         """Whether base and arm are at rest after the last run; as much later as the machine has held up a real one."""
         began = time.monotonic()

@@ -6,7 +6,7 @@ import pinocchio as pin
 from bridge.config import OdometryConfig
 from bridge.core.interface import NO_CUT, Measurement
 from bridge.core.odometer import Odometer
-from controller.config import ControllerConfig
+from controller.config import ControllerConfig, WholeBodyConfig
 from controller.motion.body import BaseEstimate, wheels_ahead
 from controller.motion.follower import Follower, Measured
 from controller.motion.tool_motion import Leg, ToolMotion
@@ -21,6 +21,9 @@ LATE = OdometryConfig(
 )
 
 
+_LIMITS = WholeBodyConfig()
+
+
 class DrivenBase:
     """0.8 m along the row and 0.1 m towards it, wheels and joints following their commands with first-order lags.
 
@@ -29,8 +32,8 @@ class DrivenBase:
     the wheels' velocities as the controller predicts them.
     """
 
-    def __init__(self, rate_hz, base_rate_hz, lag=0.1, knows="predicted"):
-        self.config = ControllerConfig(rate_hz=rate_hz, base_rate_hz=base_rate_hz)
+    def __init__(self, rate_hz, base_rate_hz, lag=0.1, knows="predicted", limits=_LIMITS):
+        self.config = ControllerConfig(rate_hz=rate_hz, base_rate_hz=base_rate_hz, whole_body=limits)
         self.dt, self.every, self.lag, self.knows = 1.0 / rate_hz, self.config.base_every, lag, knows
         arm, base = (make_method(ROBOT, self.config.whole_body, dt) for dt in (self.dt, self.dt * self.every))
         self.method = TwoRates(arm, base, self.every)

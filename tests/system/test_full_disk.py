@@ -32,4 +32,6 @@ def test_a_full_disk_stops_the_robot_and_the_stop_still_works(tmp_path: Path) ->
         robot.wait(lambda: robot.mode() == "ESTOP_LATCHED", 5, "the stop")
         whole = verify(tmp_path / "state")
         assert whole.problem == "" and whole.rows >= rows
+        # All of this takes a quarter of a second, as braking does: the trace has to go on until the limit is over.
+        robot.wait(lambda: robot.clock() > filled + 1.5, 5, "the robot to come to rest")
     assert trace.read(robot.trace).stopping_time(filled) < 1.0

@@ -156,7 +156,7 @@ def test_a_cut_that_changes_in_between_is_seen_anew_or_refused_with_its_reason(
     server.points = (server.points[0], msgspec.structs.replace(second, point=unknown), *server.points[2:])
     expect(card(page, "p1")).to_have_attribute("data-seen", "yes")
     page.locator("#vine-accept").click()
-    until(page, lambda: server.state_of("p1") == "ACCEPTED")
+    until(page, lambda: server.state_of("p1") == "ACCEPTED" and len(asked(server, "accept")) == 2)
     assert asked(server, "accept") == {"p1": {"revision": 5, "digest": "ab" * 16}, "p2": shown(second)}
     assert server.state_of("p2") == "PROPOSED"
     expect(page.locator(".toast")).to_contain_text("vine 1, spur 2 refused: it has changed since")

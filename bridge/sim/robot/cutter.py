@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from bridge.config import BridgeConfig
@@ -117,19 +118,17 @@ def close_blades(row: Row, T_world_tool: Array, config: BridgeConfig) -> CutResu
     fraction = _plane_crossing(starts, ends)
     at = starts + np.nan_to_num(fraction)[:, None] * (ends - starts)
     crosses = ~np.isnan(fraction) & _between(at, config)
-    radius = np.array([max(rod.start_radius, rod.end_radius) for _, rod in standing])
-    touched = _touches(starts, ends, radius, config)
+    for _, rod in standing:
+        if rod.kind not in _SOFT and _reaches(rod, T_world_tool, config):
+            return CutResult((), True, reasons.blades_on_hard_part(rod.kind))
 
     cuts: list[tuple[int, Rod, float]] = []
-    for k in np.flatnonzero(crosses | touched):
+    for k in np.flatnonzero(crosses):
         index, rod = standing[k]
-        local = rod.at(float(fraction[k]))[1] if crosses[k] else 0.0
-        if rod.kind not in _SOFT and touched[k]:
-            return CutResult((), True, reasons.blades_on_hard_part(rod.kind))
+        local = rod.at(float(fraction[k]))[1]
         if 2 * local > config.largest_diameter:
             return CutResult((), True, reasons.wood_beyond_blades(rod.kind, 2000 * local))
-        if crosses[k]:
-            cuts.append((index, rod, float(fraction[k])))
+        cuts.append((index, rod, float(fraction[k])))
     if not cuts:
         return CutResult((), False, reasons.nothing_between_blades())
     severed = tuple(SeveredRod(index, rod, along, rod.at(along)[0]) for index, rod, along in cuts)
@@ -165,14 +164,13 @@ def _between(points: Array, config: BridgeConfig) -> Mask:
     return inside
 
 
-def _touches(starts: Array, ends: Array, radius: Array, config: BridgeConfig) -> Mask:
-    """Whether any part of each rod is between the blades: slab test of its axis, with the box grown by its radius."""
-    half = np.array([config.opening / 2, config.blade_half_thickness, config.blade_half_length])
-    reach = np.broadcast_to(half, starts.shape) + radius[:, None]
-    along = ends - starts
-    safe = np.where(np.abs(along) < 1e-12, 1e-12, along)
-    near, far = (-reach - starts) / safe, (reach - starts) / safe
-    enter = np.minimum(near, far).max(axis=1).clip(min=0.0)
-    leave = np.maximum(near, far).min(axis=1).clip(max=1.0)
-    touches: Mask = enter <= leave
-    return touches
+def _reaches(rod: Rod, T_world_tool: Array, config: BridgeConfig) -> bool:
+    """Whether any part of a rod is between the blades."""
+    axis = rod.end - rod.start
+    along = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), axis).toRotationMatrix()
+    wood = pin.coal.Capsule(max(rod.start_radius, rod.end_radius), float(np.linalg.norm(axis)))
+    box = pin.coal.Box(config.opening, 2 * config.blade_half_thickness, 2 * config.blade_half_length)
+    at_wood = pin.coal.Transform3s(along, (rod.start + rod.end) / 2)
+    at_blades = pin.coal.Transform3s(T_world_tool[:3, :3].copy(), T_world_tool[:3, 3].copy())
+    request, result = pin.coal.CollisionRequest(), pin.coal.CollisionResult()
+    return bool(pin.coal.collide(wood, at_wood, box, at_blades, request, result))

@@ -1,15 +1,32 @@
-"""The quickest rest-to-rest motion over a distance within velocity, acceleration and jerk."""
+"""The quickest motion from rest to rest over a distance, within velocity, acceleration and jerk."""
 
 import math
 from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 
-from controller.motion.tool_motion import Rates
 from rolling_panda.model.differential_drive import Array
 
 #: Shorter distances need no motion: they are covered at once, without velocity.
 _NOTHING = 1e-12
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Limits of velocity, acceleration and jerk along one distance, in the unit of the distance and seconds."""
+
+    velocity: float
+    acceleration: float
+    jerk: float
+
+
+class Progress(Struct, frozen=True):
+    """Progress 0…1 along a motion, and its first two time derivatives (1/s, 1/s²)."""
+
+    s: float
+    rate: float
+    acceleration: float
 
 
 @dataclass(frozen=True)
@@ -42,6 +59,36 @@ class Profile:
     def duration(self) -> float:
         """Time from rest to rest (s)."""
         return 2.0 * self.ramp + self.t_cruise
+
+    def progress(self, time: float) -> Progress:
+        """Share of the distance that is covered at `time` (s), and its derivatives; held before and after."""
+        if time <= 0.0:
+            return Progress(0.0, 0.0, 0.0)
+        if time >= self.duration:
+            return Progress(1.0, 0.0, 0.0)
+        left = self.duration - time
+        mirrored = min(time, left)
+        ramp = min(mirrored, self.ramp)
+        later, last = max(ramp - self.t_jerk, 0.0), max(ramp - self.t_jerk - self.t_hold, 0.0)
+        jerk = self.jerk / abs(self.distance)
+        rate = jerk / 2.0 * (ramp**2 - later**2 - last**2)
+        s = jerk / 6.0 * (ramp**3 - later**3 - last**3) + rate * (mirrored - ramp)
+        acceleration = jerk * (ramp - later - last) if mirrored < self.ramp else 0.0
+        return Progress(s, rate, acceleration) if time <= left else Progress(1.0 - s, rate, -acceleration)
+
+    def over(self, time: float, duration: float) -> Progress:
+        """The same where it takes `duration` (s), more or less than its own."""
+        faster = self.duration / duration
+        at = self.progress(faster * time)
+        return Progress(at.s, faster * at.rate, faster**2 * at.acceleration)
+
+    def when(self, s: float) -> float:
+        """Share of its duration after which the share `s` of the distance is covered."""
+        low, high = 0.0, 1.0
+        for _ in range(30):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if self.progress(middle * self.duration).s < s else (low, middle)
+        return 0.5 * (low + high)
 
     def at(self, time: Array) -> Array:
         """Distance covered at each time (s); held before the start and after the end."""
@@ -79,6 +126,16 @@ def quickest(distance: float, rates: Rates) -> Profile:
     # Rounding of the times would leave an error at the end; the jerk compensates it.
     covered = t_jerk * (t_jerk + t_hold) * (2.0 * t_jerk + t_hold + t_cruise)
     return Profile(distance, d / covered, t_jerk, t_hold, t_cruise)
+
+
+def together(*ways: tuple[float, Rates]) -> Rates:
+    """Limits of a common progress 0…1 over several distances at once, each with its own rates."""
+    sizes = [(max(abs(distance), _NOTHING), rates) for distance, rates in ways]
+    return Rates(
+        min(rates.velocity / size for size, rates in sizes),
+        min(rates.acceleration / size for size, rates in sizes),
+        min(rates.jerk / size for size, rates in sizes),
+    )
 
 
 def durations(distances: Array, rates: Rates) -> Array:
