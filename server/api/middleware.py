@@ -18,10 +18,10 @@ from rolling_panda.messages.types import Reason
 from rolling_panda.runtime.token_bucket import TokenBuckets
 from server.api.responses import outcome
 from server.auth.sessions import Session, Sessions
+from server.connections.http_protocol import OPTIONAL_BODY
 
 _PUBLIC_PATHS = frozenset({"/api/sign-in", "/api/health", "/api/openapi.json"})
-#: Requests with an optional body: one that is too long or too late (s) is ignored, and the request proceeds.
-_OPTIONAL_BODY = frozenset({"/api/stop"})
+#: Wait for an optional body (s).
 _OPTIONAL_BODY_S = 0.25
 #: Rate limit and burst of one address without a session; further requests wait, up to this time (s).
 _VISITOR_RATE_HZ, _VISITOR_BURST, _MAX_WAIT_S = 200.0, 400.0, 5.0
@@ -91,13 +91,13 @@ class SecurityMiddleware:
             await _refuse(with_headers, 401, reasons.not_signed_in())
             return
         try:
-            async with asyncio.timeout(_OPTIONAL_BODY_S if path in _OPTIONAL_BODY else None):
+            async with asyncio.timeout(_OPTIONAL_BODY_S if path in OPTIONAL_BODY else None):
                 body = await _read_body(receive, self._max_body)
         except (TimeoutError, ClientDisconnect):
-            if path not in _OPTIONAL_BODY:
+            if path not in OPTIONAL_BODY:
                 return
             body = None
-        if body is None and path in _OPTIONAL_BODY:
+        if body is None and path in OPTIONAL_BODY:
             body = b""
         if body is None:
             await _refuse(with_headers, 413, reasons.body_too_long(float(self._max_body)))

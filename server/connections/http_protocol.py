@@ -15,6 +15,8 @@ from server.connections.listener import Connection, Connections, refusal
 
 #: Time for which a refused connection stays open (s): a reset would discard the reason before the client reads it.
 LINGER_S = 1.0
+#: Requests with an optional body: one that is too long or too late is ignored, and the request proceeds.
+OPTIONAL_BODY = frozenset({"/api/stop"})
 _EARLIEST = 0.8
 
 
@@ -123,7 +125,9 @@ class TimedHttp(H11Protocol):
     def _missing(self) -> str:
         """What has to come next; empty while a request is answered."""
         if self.conn.their_state is h11.SEND_BODY:
-            return "body"
+            # The application waits for an optional body itself, and not for long.
+            is_optional = self.scope["path"] in OPTIONAL_BODY and not self._is_body_left_over()
+            return "" if is_optional else "body"
         if self.conn.their_state is h11.IDLE:
             return "head" if self.conn.trailing_data[0] else "request"
         return ""

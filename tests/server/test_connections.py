@@ -148,6 +148,15 @@ def test_a_request_that_was_broken_off_is_not_carried_out_but_a_stop_is(plain):
         assert plain.wire.asked == []
 
 
+def test_a_stop_that_takes_longer_than_a_body_may_is_answered_all_the_same():
+    wire = FakeWire()
+    with running_server(wire, ServerConfig(body_s=0.3)) as server, telling(wire), server.client() as client:
+        head = f"POST /api/stop HTTP/1.1\r\nHost: a\r\nOrigin: {server.address}\r\nCookie: {server.cookie(client)}\r\n"
+        with opened(server) as connection:
+            connection.sendall(f"{head}Content-Length: 100\r\n\r\n{{".encode())
+            assert b'"code":"stop_unconfirmed"' in heard(connection)
+
+
 def test_who_keeps_to_the_limits_is_served_beside_those_who_do_not(plain):
     with contextlib.ExitStack() as stack, plain.client(user="ann") as client:
         for _ in range(40):
