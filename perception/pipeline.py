@@ -33,7 +33,7 @@ from perception.tracking.cut_sight import CutFollower, unseen
 from perception.tracking.picture_shift import UNSHIFTED
 from perception.tracking.retained_canes import RetainedCanes
 from perception.tracking.spur_pictures import SpurPictures
-from perception.tracking.tracker import Proposal, Tracker, TrackerUpdate
+from perception.tracking.tracker import Proposal, Site, Tracker, TrackerUpdate
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.commands import (
@@ -235,13 +235,15 @@ class Perception:
         self._spur_pictures.add(view, plant, numbers)
         fused = {spur.number: spur.as_spur() for spur in self.plant_map.spurs} if self._config.fuse else {}
         keep_out = frame_keep_out(view, labels, self._wood, self._config.rule)
-        proposals = []
+        proposals: list[Proposal] = []
+        contradicted: set[Site] = set()
         for seen, spur, number in zip(plant.spurs, spurs, numbers, strict=True):
             decision = apply_rule(fused.get(number, spur), self._config.rule, plant.other_canes(seen), keep_out)
             proposals += [Proposal(cut, number) for cut in decision.cuts]
+            contradicted |= {(number, kind) for kind in decision.contradicted}
             aside = abs(float(view.R[:, 0] @ (spur.position - view.t)))
             self._update_undecided(number, spur, decision, in_front=aside < _IN_FRONT)
-        self._apply(self._tracker.update(view, labels, proposals, numbers))
+        self._apply(self._tracker.update(view, labels, proposals, numbers, contradicted))
         self._update_obstacles(view, labels, cylinders, numbers)
         self._cane_lines = self.plant_map.cane_lines()
         self._site_messages = self._undecided_sites()

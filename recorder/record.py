@@ -57,11 +57,14 @@ def record(wire: Onlooker, path: Path, stopping: threading.Event) -> tuple[int, 
     writer = RecordingWriter(path, wire.robot_id)
     messages: MessageQueue = queue.Queue(_QUEUE_SIZE)
     dropped = 0
+    # Read once: with a reading for each message, a thread held up between the two clocks, or a clock that is set, would
+    # change the order of messages.
+    epoch_ns = time.time_ns() - time.monotonic_ns()
 
     def enqueue(topic: Topic[Any], message: m.Message, received_at: float) -> None:
         nonlocal dropped
         try:
-            messages.put_nowait((topic, message, time.time_ns() - round(1e9 * (time.monotonic() - received_at))))
+            messages.put_nowait((topic, message, epoch_ns + round(1e9 * received_at)))
         except queue.Full:
             dropped += 1
 

@@ -1770,6 +1770,11 @@ def stub_unclear() -> None:
 
 
 @_reason("info", "")
+def keeper_close(difference_mm: float) -> None:
+    """With {difference_mm:.1f} mm more or less in thickness another cane would stay."""
+
+
+@_reason("info", "")
 def cane_below_keeper() -> None:
     """One of them grows below the cane that stays."""
 
@@ -2033,6 +2038,11 @@ def withdrawn_as_elsewhere(point: str, vine: float, spur: float) -> None:
 @_reason("info", "")
 def withdrawn_as_unconfirmed(point: str, vine: float, spur: float) -> None:
     """{point} (vine {vine:.0f}, spur {spur:.0f}) withdrawn: too few views from other sides show this cut."""
+
+
+@_reason("info", "")
+def withdrawn_as_contradicted(point: str, vine: float, spur: float) -> None:
+    """{point} (vine {vine:.0f}, spur {spur:.0f}) withdrawn: more pictures speak against this cut than for it."""
 
 
 @_reason("info", "")

@@ -46,6 +46,9 @@ _STUB_SHARES = (0.5, 0.65, 0.8)
 #: Length of a cane that gives its direction at the base (m), least sine of its angle to the stub, and most that the
 #: stub hides of its axis (m).
 _BASE, _LEAST_SINE, _THICK = 0.025, 0.2, 0.015
+#: Reasons against a cut that other pictures propose: they see its nodes or canes otherwise. All others only tell that a
+#: picture shows too little.
+_AGAINST = {"nodes_side_by_side", "nodes_far_apart", "cane_below_keeper", "keeper_close"}
 #: The Guyot rule never proposes the removal of last year's cane: its head is not visible from the front.
 _OLD_CANE: Final = reasons.old_cane_left()
 
@@ -88,10 +91,23 @@ class Cut:
 
 @dataclass(frozen=True)
 class Decision:
-    """Cuts of one spur, and the reasons for what is left undecided."""
+    """Cuts of one spur, the reasons for what is left undecided, and the kinds of cut that these speak against."""
 
     cuts: tuple[Cut, ...] = ()
     undecided: tuple[Reason, ...] = ()
+    contradicted: frozenset[CutKind] = frozenset()
+
+    @classmethod
+    def of(cls, results: dict[CutKind, Cut | Reason], undecided: tuple[Reason, ...]) -> "Decision":
+        """From a cut of each kind or the reason why there is none, and the reasons that are told."""
+        cuts = tuple(result for result in results.values() if isinstance(result, Cut))
+        refused = {kind: result for kind, result in results.items() if isinstance(result, Reason)}
+        return cls(cuts, undecided, frozenset(kind for kind, why in refused.items() if _speaks_against(why)))
+
+
+def _speaks_against(reason: Reason) -> bool:
+    parts = (value for _, value in reason.values if isinstance(value, Reason))
+    return reason.code in _AGAINST or any(_speaks_against(part) for part in parts)
 
 
 @dataclass(frozen=True)
@@ -144,15 +160,11 @@ def _prune_spur(spur: Spur, config: RuleConfig, others: list[Array], keep_out: K
         return Decision(undecided=(reasons.cane_base_hidden(),))
     wood = [cane.axis for cane in spur.canes if cane is not keeper.cane] + others
     shorten = _shorten(keeper, wood, config, keep_out)
-    if len(spur.canes) == 1:
-        return Decision(undecided=(shorten,)) if isinstance(shorten, Reason) else Decision(cuts=(shorten,))
-    # Which cane stays is known, wherever it will be cut: it may be pruned already, or hide a node.
-    renew = _renew(spur, keeper, shorten, config, keep_out)
-    if isinstance(shorten, Reason):
-        return Decision(cuts=() if isinstance(renew, Reason) else (renew,), undecided=(shorten,))
-    if isinstance(renew, Reason):
-        return Decision(cuts=(shorten,), undecided=(renew,))
-    return Decision(cuts=(shorten, renew))
+    results: dict[CutKind, Cut | Reason] = {"spur cut": shorten}
+    if len(spur.canes) > 1:
+        # Which cane stays is known, wherever it will be cut: it may be pruned already, or hide a node.
+        results["renewal cut"] = _renew(spur, keeper, shorten, config, keep_out)
+    return Decision.of(results, _refusals(results)[:1])
 
 
 def _prune_guyot(spur: Spur, config: RuleConfig, others: list[Array], keep_out: KeepOut) -> Decision:
@@ -164,12 +176,15 @@ def _prune_guyot(spur: Spur, config: RuleConfig, others: list[Array], keep_out: 
     if float(upper.origin[2] - lower.origin[2]) < config.height_error:
         return Decision(undecided=(reasons.canes_at_same_height(),))
     fruiting = replace(config, nodes_kept=config.fruiting_nodes)
-    results = (
-        _shorten(_Keeper(lower, "lower", 2), [upper.axis, *others], config, keep_out),
-        _shorten(_Keeper(upper, "upper", 2), [lower.axis, *others], fruiting, keep_out, True),
-    )
-    cuts = tuple(result for result in results if isinstance(result, Cut))
-    return Decision(cuts, (_OLD_CANE, *(result for result in results if isinstance(result, Reason))))
+    results: dict[CutKind, Cut | Reason] = {
+        "spur cut": _shorten(_Keeper(lower, "lower", 2), [upper.axis, *others], config, keep_out),
+        "cane cut": _shorten(_Keeper(upper, "upper", 2), [lower.axis, *others], fruiting, keep_out, True),
+    }
+    return Decision.of(results, (_OLD_CANE, *_refusals(results)))
+
+
+def _refusals(results: dict[CutKind, Cut | Reason]) -> tuple[Reason, ...]:
+    return tuple(result for result in results.values() if isinstance(result, Reason))
 
 
 def choose_keeper(spur: Spur, config: RuleConfig) -> _Keeper | Reason:
@@ -393,6 +408,9 @@ def _renew(spur: Spur, keeper: _Keeper, shorten: Cut | Reason, config: RuleConfi
     def left(why: Reason) -> Reason:
         return reasons.other_cane_left(why) if len(others) == 1 else reasons.other_canes_left(len(others), why)
 
+    # It takes the other canes for good; a spur cut leaves them to a second look.
+    if keeper.turns_on is not None:
+        return left(reasons.keeper_close(1000 * keeper.turns_on))
     if keeper.cane.base_gap > config.max_base_gap:
         return left(reasons.cane_base_hidden())
     if spur.axis is None or spur.radius <= 0.0:
@@ -433,7 +451,7 @@ def _renew(spur: Spur, keeper: _Keeper, shorten: Cut | Reason, config: RuleConfi
         confidence=0.8 * shorten.confidence if isinstance(shorten, Cut) else _DOUBTFUL * keeper.certainty,
         nodes_seen=len(count_nodes(keeper.cane, config)),
         nodes_kept=config.nodes_kept,
-        reason=keeper.explained(reasons.renewal_cut(len(others))),
+        reason=reasons.renewal_cut(len(others)),
         node_distance=node_distance(keeper.cane, keeper.cane.nodes, position),
         cane=keeper.cane.number,
         outward=_free(farthest, lambda shift: keep_out.reason(position + shift * along) is None),

@@ -4,7 +4,7 @@ import copy
 import dataclasses
 import math
 from collections import Counter, defaultdict, deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from statistics import median_high
 
@@ -80,6 +80,8 @@ class _Track:
     tangent: Array
     radius: float
     hits: int = 1
+    against: int = 0
+    """Frames that told a reason against a cut of its kind on its spur."""
     misses: int = 0
     gone: int = 0
     published: m.PruningPoint | None = None
@@ -115,6 +117,11 @@ class _Track:
     @property
     def site(self) -> Site:
         return self.number, self.cut.kind
+
+    @property
+    def is_contradicted(self) -> bool:
+        """Whether more frames speak against it than for it."""
+        return self.against > self.hits
 
     def is_for(self, cut: Cut) -> bool:
         """Whether a cut near it may be its own: of the same kind, and on the same cane as far as both are known."""
@@ -201,6 +208,7 @@ class Tracker:
         labels: Labels,
         proposals: list[Proposal],
         shown: Sequence[SpurNumber] = (),
+        contradicted: Collection[Site] = (),
     ) -> TrackerUpdate:
         """Add one frame.
 
@@ -209,7 +217,10 @@ class Tracker:
             labels: H×W class indices.
             proposals: Its proposed cuts.
             shown: The spurs that it shows, with a proposal or without.
+            contradicted: Spurs and kinds of cuts that it speaks against.
         """
+        for track in self._tracks:
+            track.against += track.site in contradicted
         supported = self._associate(proposals)
         for track in supported:
             _add_viewpoint(track.viewpoints, view.t)
@@ -278,7 +289,7 @@ class Tracker:
             track = min(same, key=lambda each: distance(each.position, cut.position))
             old.remove(track)
             if distance(track.position, cut.position) < self._config.position_tolerance:
-                track.cut = cut
+                track.cut, track.against = cut, 0
             else:
                 published, track = track.published, _Track.of(track.point_id, proposal)
                 track.published = published
@@ -377,16 +388,17 @@ class Tracker:
         track.viewpoints = list(self._looks[track.number].viewpoints)
 
     def _confirmed(self, track: _Track) -> bool:
-        """Whether enough of the viewpoints that have shown its spur have shown its cut; one by hand needs none."""
+        """Whether as many frames speak for it as against, from enough viewpoints; one by hand needs none."""
         needed = min(self._config.min_viewpoints, math.ceil(len(self._looks[track.number].viewpoints) / 2))
-        return track.cut.kind == "by hand" or len(track.viewpoints) >= needed
+        return track.cut.kind == "by hand" or (len(track.viewpoints) >= needed and not track.is_contradicted)
 
     def _withdraw_for_now(self, track: _Track, point: m.PruningPoint) -> m.Reason:
-        """Withdraw a point until other viewpoints confirm it; then it has a new revision."""
+        """Withdraw a point until more frames or other viewpoints confirm it; then it has a new revision."""
         self._withdrawn[track.point_id] = point
         self._last_revision[track.point_id] = max(point.revision, self._last_revision.get(track.point_id, 0))
         track.published = None
-        return reasons.withdrawn_as_unconfirmed(track.point_id, track.number.vine, track.number.spur)
+        withdrawn = reasons.withdrawn_as_contradicted if track.is_contradicted else reasons.withdrawn_as_unconfirmed
+        return withdrawn(track.point_id, track.number.vine, track.number.spur)
 
     def _publish(self, supported: list[_Track]) -> None:
         tracks = Counter(track.site for track in self._tracks)

@@ -259,18 +259,33 @@ def test_a_diameter_seen_often_leaves_less_in_doubt():
         (0.0026, 0.00292, None),  # The high one stays whether it is thick enough or not.
     ],
 )
-def test_a_choice_that_little_thickness_turns_over_is_unsure_and_says_so(low, high, turns_on):
-    """So nobody accepts it with all sure cuts of a vine at once."""
+def test_a_choice_that_little_thickness_turns_over_is_unsure_removes_no_other_cane_and_says_so(low, high, turns_on):
+    """So nobody accepts it with all sure cuts of a vine at once, and no cane is gone that should have stayed."""
     canes = [cane(radius=low, base=(0.02, 0.0, 0.93)), cane(radius=high, base=(0.0, 0.0, 0.99))]
-    cuts = apply_rule(spur(*(replace(each, observations=9) for each in canes)), RULE).cuts
-    assert cuts
-    for cut in cuts:
-        told = dict(cut.reason.values).get("difference_mm")
-        assert (told is None) == (turns_on is None), cut.reason
-        if turns_on is not None:
-            assert told == pytest.approx(turns_on) and cut.confidence < SURE
-        elif cut.kind == "spur cut":
-            assert cut.confidence >= SURE
+    decision = apply_rule(spur(*(replace(each, observations=9) for each in canes)), RULE)
+    shorten = decision.cuts[0]
+    assert shorten.kind == "spur cut" and (shorten.confidence < SURE) == (turns_on is not None)
+    told = dict(shorten.reason.values).get("difference_mm")
+    if turns_on is None:
+        assert told is None and "keeper_close" not in repr(decision.undecided)
+    else:
+        assert told == pytest.approx(turns_on)
+        assert len(decision.cuts) == 1 and decision.contradicted == {"renewal cut"}
+        assert decision.undecided == (reasons.other_cane_left(reasons.keeper_close(told)),)
+
+
+def test_what_speaks_against_a_cut_is_told_apart_from_what_shows_too_little():
+    low, high = cane(base=(0.025, 0.0, 0.93)), cane(base=(0.0, 0.0, 0.99))
+    for nodes in ((0.02, 0.10, 0.12, 0.18), (0.02, 0.1, 0.26)):
+        assert apply_rule(spur(replace(low, nodes=cane(nodes=nodes).nodes), high), RULE).contradicted == {"spur cut"}
+    # Its axis comes out of the stub below that of the keeper, though it is seen from farther up.
+    below = apply_rule(spur(low, leaving((0.02, 0.0, 0.944), 0.5)), RULE)
+    assert below.undecided == (reasons.other_cane_left(reasons.cane_below_keeper()),)
+    assert below.contradicted == {"renewal cut"}
+    for unseen in (replace(low, base_gap=0.03), cane(nodes=(0.02, 0.10), base=(0.025, 0.0, 0.93))):
+        decision = apply_rule(spur(unseen, high), RULE)
+        assert decision.undecided and not decision.contradicted
+    assert not apply_rule(spur(low, high), RULE).contradicted
 
 
 def test_a_cane_that_runs_into_another_is_cut_where_enough_of_it_is_seen_and_a_pruned_one_never_again():

@@ -188,6 +188,41 @@ def test_viewpoints_withdraw_neither_a_point_by_hand_nor_what_a_new_rule_makes_o
         assert {point.kind for point in shown[-1]} == {"by hand", "spur cut"} and not withdrawn
 
 
+def test_a_point_that_more_frames_speak_against_than_for_is_withdrawn_until_they_do_not():
+    tracker, site = Tracker(CONFIG), (SpurNumber(1, 1), "spur cut")
+
+    def look(cuts, *against):
+        image = view()
+        return tracker.update(image, image.labels, cuts, [SpurNumber(1, 1)], against).withdrawn
+
+    for _ in range(3):
+        look([proposal()])
+    (before,) = tracker.points()
+    for _ in range(3):
+        assert not look([], site), "as many are for it"
+    look([], (SpurNumber(1, 1), "renewal cut"))
+    look([], (SpurNumber(2, 1), "spur cut"))
+    assert tracker.points() == (before,), "those speak against others"
+    assert look([], site) == (reasons.withdrawn_as_contradicted(before.point_id, 1, 1),) and not tracker.points()
+    assert not look([proposal()])
+    (after,) = tracker.points()
+    assert (after.point_id, after.revision) == (before.point_id, before.revision + 1)
+
+
+def test_frames_speak_against_neither_a_point_by_hand_nor_one_of_a_later_rule():
+    tracker, by_hand = Tracker(CONFIG), proposal(y=0.1)
+    tracker.add(replace(by_hand, cut=replace(by_hand.cut, kind="by hand")))
+    image = view()
+    for _ in range(3):
+        tracker.update(image, image.labels, [proposal()], [SpurNumber(1, 1)])
+    against = [(SpurNumber(1, 1), "spur cut"), (SpurNumber(1, 1), "by hand")]
+    for _ in range(2):
+        tracker.reset([proposal()])
+        for _ in range(3):
+            tracker.update(image, image.labels, [], [SpurNumber(1, 1)], against)
+        assert {point.kind for point in tracker.points()} == {"by hand", "spur cut"}
+
+
 def test_viewpoints_of_a_rule_that_was_undone_do_not_count_against_a_point():
     tracker = Tracker(CONFIG)
     survey(tracker, *[look_from(0.0, proposal())] * CONFIG.min_hits)

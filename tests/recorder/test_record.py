@@ -1,12 +1,15 @@
 """`rolling-panda record` as a process: what a killed one has on disk."""
 
+import functools
 import signal
 import subprocess
+import threading
 import time
 from pathlib import Path
 
 import pytest
 
+from recorder.record import record
 from recorder.recording import read_recording
 from rolling_panda import messages as m
 from rolling_panda import topics
@@ -15,7 +18,33 @@ from rolling_panda.reasons import said, text_of
 from rolling_panda.runtime.launch import child_environment, python_command
 from rolling_panda.transport.zenoh import Transport
 
-pytestmark = pytest.mark.processes
+
+class SetBackClock:
+    """A wire of numbered events, 10 ms apart, while the clock of the machine is set back by an hour."""
+
+    robot_id = "rp1"
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, stopping: threading.Event) -> None:
+        self._monkeypatch, self._stopping = monkeypatch, stopping
+
+    def subscribe(self, topic, store):
+        if topic is not topics.EVENT:
+            return
+        for k in range(6):
+            if k == 3:
+                self._monkeypatch.setattr(time, "time_ns", functools.partial(int, time.time_ns() - 3_600_000_000_000))
+            store(m.LogEvent(header=m.Header(k * 0.01), process="bridge", reason=said(str(k))), 100.0 + k * 0.01)
+        self._stopping.set()
+
+
+def test_a_clock_that_is_set_changes_neither_order_nor_distances_of_messages(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stopping = threading.Event()
+    record(SetBackClock(monkeypatch, stopping), tmp_path / "a.mcap", stopping)  # type: ignore[arg-type]
+    messages = read_recording(tmp_path / "a.mcap").messages
+    assert [text_of(each.message().reason) for each in messages] == list("012345")  # type: ignore[attr-defined]
+    assert messages[-1].at - messages[0].at == pytest.approx(0.05, abs=1e-6)
 
 
 def publish(transport: Transport, seconds: float, recorder: subprocess.Popen[str] | None = None) -> float:
@@ -34,6 +63,7 @@ def publish(transport: Transport, seconds: float, recorder: subprocess.Popen[str
     return sent
 
 
+@pytest.mark.processes
 @pytest.mark.long
 @pytest.mark.parametrize("killed", [True, False])
 def test_a_killed_recorder_loses_less_than_a_second_and_one_that_is_ended_nothing(
