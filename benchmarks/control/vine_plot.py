@@ -23,21 +23,24 @@ def draw_vine(folder: Path, figure: Figure) -> None:
     """A bar for each vine, in a panel for each condition.
 
     Args:
-        folder: With `vine.json`.
+        folder: With files of vines, `vine*.json`.
         figure: To draw in.
 
     Raises:
-        FileNotFoundError: The file is not there.
-        InputError: The file is not what the benchmark writes, or has no vine.
+        FileNotFoundError: There is no such file.
+        InputError: A file is not what the benchmark writes, or has no vine.
     """
-    path = folder / "vine.json"
-    document = json.loads(path.read_text(encoding="utf-8"))
-    if not isinstance(document, dict) or not document.get("results") or "stages_s" not in document:
-        raise InputError(f"{path} has no vines of `bench vine --json`; run it again")
+    paths = sorted(folder.glob("vine*.json"))
+    if not paths:
+        raise FileNotFoundError(folder / "vine.json")
     groups: dict[str, list[dict[str, float]]] = {}
-    for run in document["results"]:
-        name = f"{run['training']}, {run['preset']}, {run['review']} {run['decision_s']:g} s"
-        groups.setdefault(name, []).append(run["stages"])
+    for path in paths:
+        document = json.loads(path.read_text(encoding="utf-8"))
+        if not isinstance(document, dict) or not document.get("results") or "stages_s" not in document:
+            raise InputError(f"{path} has no vines of `bench vine --json`; run it again")
+        for run in document["results"]:
+            name = f"{run['training']}, {run['preset']}, {run['review']} {run['decision_s']:g} s"
+            groups.setdefault(name, []).append(run["stages"])
     sizes = [len(own) for own in groups.values()]
     figure.set_size_inches(8.0, 1.2 + 0.22 * sum(sizes) + 0.35 * len(sizes))
     panels = figure.subplots(len(groups), 1, sharex=True, squeeze=False, height_ratios=sizes).ravel()

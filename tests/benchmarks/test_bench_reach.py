@@ -138,6 +138,17 @@ def test_goals_anywhere_are_reached_without_breaking_a_limit(free_axis, tmp_path
     assert t[-1] == pytest.approx(rows[3].quality.duration)
 
 
+@pytest.mark.long
+def test_no_motion_from_anywhere_comes_below_the_clearance_that_it_began_with():
+    rows = reach.run(reach_targets.draw(48, 12, "none", anywhere=True), "hierarchy", 0, 1)
+    clear = [row.quality for row in rows if row.quality.clearance_start > 0.0]
+    within = [row.quality for row in rows if row.quality.clearance_start <= 0.0]
+    assert len(clear) >= 6 and within
+    assert max(quality.clearance_lost for quality in clear) <= 0.0
+    # Where parts overlap, their nearest points jump from face to face.
+    assert max(quality.clearance_lost for quality in within) < 0.002
+
+
 @pytest.mark.parametrize("height", [1.47, 1.485])
 def test_goals_near_the_end_of_the_reach_are_kept_to_although_the_arm_is_almost_straight(height):
     target = reach_targets.Target(

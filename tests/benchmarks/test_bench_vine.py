@@ -320,6 +320,18 @@ def test_a_run_goes_on_where_the_last_one_stopped_and_its_file_is_drawn(tmp_path
     assert "2 vines" in panel.get_title(loc="left")
     widths = [bar.get_width() for bar in panel.patches if bar.get_width() > 0.0]
     assert sorted(widths) == [12.0, 12.0, 20.0, 20.0]
+    (tmp_path / "vine_guyot.json").write_text(path.read_text().replace('"spur"', '"guyot"'))
+    figure = Figure()
+    draw_vine(tmp_path, figure)
+    assert [panel.get_title(loc="left").split(",")[0] for panel in figure.axes] == ["spur", "guyot"]
+    (tmp_path / "vine_other.json").write_text("{}")
+    with pytest.raises(InputError, match="vine_other"):
+        draw_vine(tmp_path, Figure())
+
+
+def test_without_vines_there_is_no_picture_of_them(tmp_path: Path):
+    with pytest.raises(FileNotFoundError):
+        draw_vine(tmp_path, Figure())
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"results": [{"seed": 1}]}'])
