@@ -2988,6 +2988,16 @@ def unseen_in_close_up(why: Reason) -> None:
 
 
 @_reason("info", "")
+def blades_close_where_seen(point: str, age_s: float) -> None:
+    """{point}: the blades close where a picture has shown the cane {age_s:.1f} s before."""
+
+
+@_reason("info", "")
+def blades_close_unseen(point: str) -> None:
+    """{point}: no picture on the last way has shown the cane; the blades close where the close-up has seen it."""
+
+
+@_reason("info", "")
 def cut_where_seen(point: str, distance_mm: float) -> None:
     """{point} is cut {distance_mm:.0f} mm from where it was accepted: the close-up sees the same cane there."""
 

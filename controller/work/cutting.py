@@ -902,7 +902,8 @@ class Advance(MovingStage):
         if rests:
             parts.blades.start(self.point_id, Tried(self._task.planned.approach), now)
             parts.gave_way = 0
-            return Cutting(parts, self._task, self._way), result
+            told = parts.servo.told(now)
+            return Cutting(parts, self._task, self._way), result.with_event(told) if told else result
         if timeout.late(now):
             reason = missed("the cut", tracking)
             told = self.put_off(reasons.missed_once(reason), reason)

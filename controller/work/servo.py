@@ -16,7 +16,9 @@ import numpy as np
 from controller.config import WorkConfig
 from controller.motion.follower import Measured
 from controller.motion.tool_motion import ToolMotion
+from rolling_panda import reasons
 from rolling_panda.messages.perception import CutSight
+from rolling_panda.messages.types import Reason
 from rolling_panda.model.differential_drive import Array
 
 #: SD of where the close-up has a cane, sway included (m).
@@ -60,6 +62,7 @@ class CutServo:
         self._place, self._across = place.copy(), rotation[:, [0, 2]].copy()
         self._aside, self._variance, self._made = np.zeros(2), np.full(2, _BEFORE**2), np.zeros(2)
         self._asked: dict[int, _Asked] = {}
+        self._seen_at: float | None = None
         self._away, self._speed, self._next = 0.0, 0.0, -math.inf
 
     def carry(self, by: Array) -> None:
@@ -97,6 +100,15 @@ class CutServo:
         gain = self._variance / (self._variance + variance)
         self._aside = self._aside + gain * (seen - self._aside)
         self._variance = (1.0 - gain) * self._variance
+        self._seen_at = asked.at
+
+    def told(self, now: float) -> Reason | None:
+        """How old the estimate is on which the blades close; None where no pictures are asked for on the way."""
+        if not self.point_id:
+            return None
+        if self._seen_at is None:
+            return reasons.blades_close_unseen(self.point_id)
+        return reasons.blades_close_where_seen(self.point_id, now - self._seen_at)
 
     def correct(self, motion: ToolMotion, robot: Measured) -> None:
         """Lead the rest of the motion to the present estimate, one correction after the other."""

@@ -160,6 +160,23 @@ def test_when_the_cane_is_lost_on_the_way_the_last_estimate_stands(monkeypatch) 
     assert np.linalg.norm(blades(another) - moved(1, 0.0)) < EXACT
 
 
+def closing(r: Watching) -> list[str]:
+    """What the log says of the estimate on which the blades close."""
+    return [text for text in r.events if "blades close" in text]
+
+
+def test_the_log_tells_how_old_the_estimate_is_on_which_the_blades_close(monkeypatch) -> None:
+    for shown in (3, 1000):
+        r = cut(monkeypatch, lambda n, t, shown=shown: still(n, t) if n <= shown else None, late_s=0.2)
+        assert r.ordered_at is not None
+        (text,) = closing(r)
+        age = r.ordered_at - r.asked[min(shown, len(r.asked)) - 1][0]
+        assert float(text.split(" s before")[0].split()[-1]) == pytest.approx(age, abs=0.08) and age > 0.3
+    (text,) = closing(cut(monkeypatch, lambda n, t: None if n else np.zeros(3)))
+    assert "no picture on the last way" in text
+    assert not closing(cut(monkeypatch, still, controller_config(CONFIG, work__servo=False)))
+
+
 def test_a_correction_is_bounded_in_size_and_the_blades_go_in_no_faster(monkeypatch) -> None:
     r = cut(monkeypatch, lambda n, t: np.array([0.012 if n else 0.0, 0.0, 0.0]))
     assert abs(blades(r)[0] - SERVO.work.servo_reach) < EXACT
