@@ -14,7 +14,7 @@ from bridge.core.state_memory import Remembered, begin_anew, open_memory
 from bridge.loop import bridge_runner
 from bridge.real.config import RealConfig
 from bridge.sim.camera.config import CameraConfig
-from bridge.sim.vineyard.config import VineyardConfig
+from bridge.sim.vineyard.config import load_vineyard
 from bridge.sim.world.config import load_world
 from rolling_panda.calibration.file import load_robot, save_robot
 from rolling_panda.config import RobotConfig, load_section
@@ -89,7 +89,7 @@ def _check(arguments: argparse.Namespace) -> None:
     if arguments.kind == "real":
         load_section(arguments.config, "real", RealConfig)
     else:
-        load_section(arguments.config, "vineyard", VineyardConfig)
+        load_vineyard(arguments.config)
         load_section(arguments.config, "camera", CameraConfig)
         load_world(arguments.config)
 

@@ -196,6 +196,8 @@ def check(where: str, section: str, table: Mapping[str, Any], kind: type[Struct]
 
 
 def _check_one(what: str, value: Any, hint: Any, usual: Any) -> None:
+    if get_origin(hint) is Literal and isinstance(value, str) and value not in get_args(hint):
+        raise ConfigError(f"{what} is {value!r}; known are {', '.join(map(str, get_args(hint)))}")
     bound = bound_of(hint)
     # The decoder refuses values of a wrong type.
     if isinstance(value, bool) != (bound is not None and bound.switch) or not isinstance(value, int | float):

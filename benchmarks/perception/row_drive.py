@@ -21,7 +21,7 @@ from bridge.sim.camera.config import CameraConfig
 from bridge.sim.camera.renderer import InlineRenderer
 from bridge.sim.robot.model import STEP_S
 from bridge.sim.robot.robot import SimulatedRobot
-from bridge.sim.vineyard.config import VineyardConfig
+from bridge.sim.vineyard.config import VineyardConfig, load_vineyard
 from bridge.sim.vineyard.grow import grow
 from bridge.sim.world.config import WorldConfig
 from bridge.sim.world.growth import overgrown
@@ -77,7 +77,7 @@ class RowRobot:
         """
         path = resource("assets/config/sim.toml")
         config = replace(load_section(path, "bridge", BridgeConfig), inertial=inertial)
-        spacing = load_section(path, "vineyard", VineyardConfig).vine_spacing
+        spacing = load_vineyard(path).vine_spacing
         grown = grow(VineyardConfig(vines=math.ceil((metres + 2.0) / spacing) + 1, vine_spacing=spacing), seed)
         self.row = overgrown(grown, world, seed)
         renderer = InlineRenderer(load_section(path, "camera", CameraConfig), seed, world)

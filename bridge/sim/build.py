@@ -14,7 +14,7 @@ from bridge.sim.camera.config import CameraConfig
 from bridge.sim.camera.render_process import CameraRenderer, RenderProcess
 from bridge.sim.robot.robot import SimulatedRobot
 from bridge.sim.robot.trace import TraceWriter
-from bridge.sim.vineyard.config import VineyardConfig
+from bridge.sim.vineyard.config import load_vineyard
 from bridge.sim.vineyard.grow import grow
 from bridge.sim.world.config import load_world
 from bridge.sim.world.growth import overgrown
@@ -89,7 +89,8 @@ def simulated_robot(
     """
     config = load_section(config_path, "bridge", BridgeConfig)
     world = load_world(config_path)
-    row = overgrown(grow(load_section(config_path, "vineyard", VineyardConfig), seed), world, seed)
+    vineyard = load_vineyard(config_path)
+    row = overgrown(grow(vineyard, seed), world, seed, vineyard.laterals)
     lens = load_section(config_path, "camera", CameraConfig)
     writer = None if trace is None else TraceWriter(trace)
     renderer: CameraRenderer

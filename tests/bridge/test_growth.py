@@ -110,6 +110,13 @@ def test_rods_of_the_row_keep_their_indices_and_all_that_grows_comes_after_them(
         assert (before.kind, before.parent) == (after.kind, after.parent)
 
 
+def test_vines_with_many_laterals_have_them_in_any_world_and_no_fewer_in_a_rougher_one() -> None:
+    row = grow(ONE, 3)
+    own = told(overgrown(row, changed(CALM, laterals=0.2), 3).rods)
+    assert told(overgrown(row, CALM, 3, laterals=0.2).rods) == own != told(row.rods)
+    assert told(overgrown(row, changed(CALM, laterals=0.2), 3, laterals=0.1).rods) == own
+
+
 def test_laterals_are_thin_and_short_canes_and_tendrils_hold_wires() -> None:
     row = overgrown(grow(ONE, 3), changed(CALM, laterals=1.0), 3)
     lengths: dict[tuple[int, ...], float] = {}

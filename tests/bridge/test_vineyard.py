@@ -1,5 +1,6 @@
 """The row that the simulation grows."""
 
+import tomllib
 from pathlib import Path
 
 import msgspec
@@ -8,9 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridge.sim.vineyard.config import VineyardConfig
+from bridge.sim.build import simulated_robot
+from bridge.sim.vineyard.config import PRESETS, VineyardConfig, load_vineyard
 from bridge.sim.vineyard.grow import grow
 from bridge.sim.vineyard.row import Rod, Row
+from bridge.sim.vineyard.truth import judge, judge_guyot
 from rolling_panda.config import load_section
 from rolling_panda.errors import ConfigError
 from rolling_panda.resources import resource
@@ -160,3 +163,106 @@ def test_a_cut_near_the_tip_of_the_stub_takes_off_the_last_cane_only():
 def test_a_row_that_no_vine_could_be_is_refused(change, says):
     with pytest.raises(ConfigError, match=says):
         grow(msgspec.structs.replace(CONFIG, **change), 0)
+
+
+# --- presets ----------------------------------------------------------------------------------------------------------
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "sim.toml"
+    path.write_text(text)
+    return path
+
+
+def test_the_standard_preset_is_the_row_without_a_preset(tmp_path):
+    shipped = resource("assets/config/sim.toml")
+    assert load_vineyard(written(tmp_path, "")) == PRESETS["standard"] == VineyardConfig()
+    assert load_vineyard(shipped) == load_section(shipped, "vineyard", VineyardConfig)
+
+
+def test_a_preset_gives_all_values_and_a_key_replaces_its_own(tmp_path):
+    got = load_vineyard(written(tmp_path, '[vineyard]\npreset = "vigorous"\nvines = 1\ncane_droop = [0.0, 0.15]\n'))
+    assert got == msgspec.structs.replace(PRESETS["vigorous"], vines=1, cane_droop=(0.0, 0.15))
+    assert got.internode == (0.08, 0.14)
+
+
+def test_an_unknown_preset_is_refused_with_those_that_there_are(tmp_path):
+    with pytest.raises(ConfigError, match="preset is 'oak'; known are standard, short_internodes, vigorous, drooping"):
+        load_vineyard(written(tmp_path, '[vineyard]\npreset = "oak"\n'))
+
+
+def test_every_preset_has_its_name_and_differs_from_the_standard_one():
+    for name, config in PRESETS.items():
+        assert config.preset == name
+        assert name == "standard" or config != msgspec.structs.replace(CONFIG, preset=name)
+
+
+def test_the_shipped_configuration_sets_nothing_that_a_preset_sets():
+    sections = tomllib.loads(resource("assets/config/sim.toml").read_text(encoding="utf-8"))
+    for config in PRESETS.values():
+        assert all(getattr(config, key) == getattr(CONFIG, key) for key in sections["vineyard"])
+
+
+def measured(config: VineyardConfig) -> dict[str, float]:
+    """Means over some vines: canes a metre, length, diameter and internodes of a cane (m), lean of its tip (rad)."""
+    found: list[Chain] = []
+    for seed in range(8):
+        found += canes(grow(msgspec.structs.replace(config, vines=1), seed)).values()
+    gaps, leans = [], []
+    for chain in found:
+        middles = [rod.at(0.5)[0] for _, rod in chain if rod.kind == "node"]
+        gaps += [float(np.linalg.norm(b - a)) for a, b in zip(middles, middles[1:], strict=False)]
+        last = chain[-1][1]
+        leans.append(float(np.arccos((last.end - last.start)[2] / np.linalg.norm(last.end - last.start))))
+    return {
+        "canes": len(found) / 8 / config.vine_spacing,
+        "length": float(np.mean([sum(np.linalg.norm(rod.end - rod.start) for _, rod in chain) for chain in found])),
+        "diameter": float(np.mean([2 * chain[0][1].start_radius for chain in found])),
+        "internode": float(np.mean(gaps)),
+        "lean": float(np.mean(leans)),
+    }
+
+
+def test_short_internodes_have_the_published_means_of_cabernet_sauvignon():
+    got = measured(PRESETS["short_internodes"])
+    assert got["internode"] == pytest.approx(0.053, abs=0.001) and got["length"] == pytest.approx(1.30, abs=0.03)
+    assert got["canes"] == pytest.approx(14.0, abs=1.0) and got["diameter"] == pytest.approx(0.009, abs=0.0003)
+
+
+@pytest.mark.long
+def test_vigorous_vines_have_more_thicker_and_longer_canes_and_drooping_ones_lean_most():
+    got = {name: measured(config) for name, config in PRESETS.items()}
+    usual, vigorous, drooping = got["standard"], got["vigorous"], got["drooping"]
+    assert vigorous["canes"] > 1.1 * usual["canes"] and vigorous["diameter"] > 1.15 * usual["diameter"]
+    assert vigorous["internode"] > 1.3 * usual["internode"] and vigorous["length"] > 1.2 * usual["length"]
+    assert drooping["lean"] > 2.0 * max(usual["lean"], vigorous["lean"])
+    assert {key: drooping[key] for key in ("canes", "diameter")} == {key: usual[key] for key in ("canes", "diameter")}
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_right_cuts_of_every_preset_leave_the_basal_bud_and_two_nodes(preset):
+    row = grow(msgspec.structs.replace(PRESETS[preset], vines=1), 8200)
+    spurs = [each for each in judge(row) if each.cut is not None]
+    assert len(spurs) >= 10
+    for each in spurs:
+        assert each.cut is not None
+        chain = canes(row)[each.vine, each.spur, each.keeper]
+        assert sum(rod.kind == "node" and index < each.cut.rod for index, rod in chain) == 3
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_every_preset_grows_as_guyot_too(preset):
+    (vine,) = judge_guyot(grow(msgspec.structs.replace(PRESETS[preset], vines=1, training="guyot"), 8200))
+    assert vine.spur_cut is not None and vine.cane_cut is not None and vine.removal is not None
+
+
+def test_laterals_of_a_preset_grow_beside_the_simulated_robot_in_a_calm_world(tmp_path):
+    robot = simulated_robot(written(tmp_path, '[vineyard]\nvines = 1\npreset = "vigorous"\n'), 5, None, "inline")
+    try:
+        organs = {(rod.spur, rod.cane, rod.organ) for _, rod in robot.row.standing() if rod.organ >= 0}
+    finally:
+        robot.close()
+    nodes = sum(
+        rod.kind == "node" for _, rod in grow(msgspec.structs.replace(PRESETS["vigorous"], vines=1), 5).standing()
+    )
+    assert 0.08 < len(organs) / nodes < 0.20

@@ -7,8 +7,8 @@ from PIL import Image
 
 from bridge.sim.camera.config import CameraConfig
 from bridge.sim.camera.renderer import Camera
-from bridge.sim.vineyard.command import main
-from bridge.sim.vineyard.config import VineyardConfig
+from bridge.sim.vineyard.command import main, picture
+from bridge.sim.vineyard.config import PRESETS, VineyardConfig
 from bridge.sim.vineyard.file import Vineyard, cut_positions, load, save
 from bridge.sim.vineyard.grow import grow
 from bridge.sim.vineyard.truth import judge
@@ -61,11 +61,37 @@ def test_a_file_of_another_format_or_with_orphans_is_refused(tmp_path):
         load(path)
 
 
+def test_a_file_from_before_there_were_presets_is_of_the_standard_one(tmp_path):
+    path = tmp_path / "row.json"
+    save(path, Vineyard(1, VineyardConfig(), grow(VineyardConfig(), 1)))
+    document = msgspec.json.decode(path.read_bytes())
+    del document["config"]["preset"], document["config"]["laterals"]
+    path.write_bytes(msgspec.json.encode(document))
+    assert load(path).config == VineyardConfig()
+
+
+def test_a_preset_beside_a_configuration_is_refused(tmp_path, capsys):
+    with pytest.raises(SystemExit):
+        main(["--preset", "drooping", "--config", str(tmp_path / "a.toml"), "--out", str(tmp_path / "a.json")])
+    assert "give one" in capsys.readouterr().err
+
+
+def test_the_picture_shows_the_lateral_shoots_of_a_preset():
+    config = VineyardConfig(vines=1)
+    row = grow(config, 4)
+    bare, branched = (
+        np.asarray(picture(Vineyard(4, msgspec.structs.replace(config, laterals=share), row))) for share in (0.0, 0.5)
+    )
+    assert np.count_nonzero(np.any(bare != branched, axis=2)) > 2000
+
+
 def test_the_command_writes_row_and_picture(tmp_path, capsys):
     assert main(["--seed", "4", "--vines", "1", "--training", "guyot", "--out", str(tmp_path / "a.json")]) == 0
     assert load(tmp_path / "a.json").config.training == "guyot"
     pixels = np.asarray(Image.open(tmp_path / "a.png").convert("RGB")).astype(int)
     assert np.count_nonzero((pixels[..., 0] > 200) & (pixels[..., 1] < 60)) > 50, "the right cuts are ringed"
     assert "3 cuts" in capsys.readouterr().out
+    assert main(["--preset", "vigorous", "--vines", "1", "--out", str(tmp_path / "b.json")]) == 0
+    assert load(tmp_path / "b.json").config == msgspec.structs.replace(PRESETS["vigorous"], vines=1)
     assert main(["--out", str(tmp_path / "nowhere" / "a.json")]) == 1
     assert "folder that exists" in capsys.readouterr().err

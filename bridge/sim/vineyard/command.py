@@ -11,11 +11,12 @@ from PIL import Image, ImageDraw
 
 from bridge.sim.camera.config import CameraConfig
 from bridge.sim.camera.renderer import Camera
-from bridge.sim.vineyard.config import VineyardConfig
+from bridge.sim.vineyard.config import PRESETS, load_vineyard
 from bridge.sim.vineyard.file import Vineyard, cut_positions, save
 from bridge.sim.vineyard.grow import grow
 from bridge.sim.vineyard.row import Array
-from rolling_panda.config import load_section
+from bridge.sim.world.config import CALM
+from bridge.sim.world.growth import overgrown
 from rolling_panda.errors import RollingPandaError
 
 #: Width of the picture at the row, and distance of the camera (m); radius of a ring (px).
@@ -24,7 +25,7 @@ _MARK = 5
 
 
 def picture(vineyard: Vineyard, vine: int = 0) -> Image.Image:
-    """A vine from the front, with a red ring at every right cut.
+    """A vine from the front with its lateral shoots, and a red ring at every right cut.
 
     Args:
         vineyard: The row.
@@ -35,7 +36,8 @@ def picture(vineyard: Vineyard, vine: int = 0) -> Image.Image:
     place = np.eye(4)
     place[:3, :3] = np.column_stack([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
     place[:3, 3] = [config.first_vine_x + vine * config.vine_spacing, config.row_distance - _AWAY, 1.1]
-    image = Image.fromarray(camera.render(vineyard.row, place).color)
+    row = overgrown(vineyard.row, CALM, vineyard.seed, config.laterals)
+    image = Image.fromarray(camera.render(row, place).color)
     draw = ImageDraw.Draw(image)
     for u, v in _pixels(camera, place, cut_positions(vineyard)):
         draw.ellipse((u - _MARK, v - _MARK, u + _MARK, v + _MARK), outline=(230, 30, 30), width=2)
@@ -59,14 +61,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="JSON file; a PNG is written beside it")
     parser.add_argument("--vines", type=int, help="how many (default: as configured)")
     parser.add_argument("--training", choices=("cordon", "guyot"), help="training system")
+    parser.add_argument("--preset", choices=tuple(PRESETS), help="how the vines grow (default: as configured)")
     parser.add_argument("--config", type=Path, metavar="FILE", help="TOML file with a section [vineyard]")
     arguments = parser.parse_args(argv)
     try:
         if arguments.seed < 0:
             parser.error(f"--seed {arguments.seed} is negative; give 0 or more")
-        config = (
-            VineyardConfig() if arguments.config is None else load_section(arguments.config, "vineyard", VineyardConfig)
-        )
+        if arguments.preset is not None and arguments.config is not None:
+            parser.error("--preset and --config: give one; the file's [vineyard] preset does the same")
+        name = arguments.preset or "standard"
+        config = PRESETS[name] if arguments.config is None else load_vineyard(arguments.config)
         if arguments.training is not None:
             config = msgspec.structs.replace(config, training=arguments.training)
         if arguments.vines is not None:

@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from msgspec import structs
 from scipy.spatial.transform import Rotation
 
 from bridge.sim.vineyard.cane import draw, unit_vector
@@ -41,7 +42,7 @@ class _Organ:
     radii: Array
 
 
-def overgrown(row: Row, world: WorldConfig, seed: int) -> Row:
+def overgrown(row: Row, world: WorldConfig, seed: int, laterals: float = 0.0) -> Row:
     """The row with its drooping canes and lateral organs.
 
     Each cane and node has a random stream of its own: what grows there does not depend on the other vines, nor on the
@@ -51,7 +52,9 @@ def overgrown(row: Row, world: WorldConfig, seed: int) -> Row:
         row: As it was grown, before any cut.
         world: Shares of canes and nodes.
         seed: Not negative.
+        laterals: Fraction of nodes with a lateral shoot in any world, as of these vines.
     """
+    world = structs.replace(world, laterals=max(world.laterals, laterals))
     if not (world.drooping or world.laterals or world.tendrils or world.leaves):
         return row
     canes: dict[tuple[int, int, int], list[int]] = {}
