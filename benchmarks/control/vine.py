@@ -31,6 +31,7 @@ from benchmarks.control.world import calibrated
 from benchmarks.perception.blocked import Blocker, blocked_by
 from benchmarks.perception.judge import nearest_rod
 from bridge.sim.robot import trace
+from bridge.sim.vineyard.config import PRESETS as CULTIVARS
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.row import Row
 from bridge.sim.vineyard.truth import staying_rods
@@ -80,6 +81,8 @@ _SURVEY_LIMIT_S, _POINT_LIMIT_S, _WORK_LIMIT_S = 120.0, 20.0, 60.0
 _SPUR_NEAR = 0.10
 #: Periods between two looks at what touches a cane.
 _LOOK_EVERY = 4
+#: Vines whose growth conditions do not name.
+USUAL = "standard"
 #: Wood this near to a point, this far past the cut, still stands (m).
 _STANDS, _BEYOND = 0.012, 0.03
 
@@ -102,6 +105,12 @@ class Place:
     blocked: Blocker
     outcome: Outcome
     reason: str
+
+
+def condition(training: str, cultivar: str, preset: str, review: str, decision_s: float) -> str:
+    """The words for the vines of one condition."""
+    vine = training if cultivar == USUAL else f"{training}, {cultivar}"
+    return f"{vine}, {preset}, {review} {decision_s:g} s"
 
 
 @dataclass(frozen=True)
@@ -128,6 +137,7 @@ class VineRun:
         glance_s: Look at one of several pictures (s).
         glances: Such looks.
         stops: Protective stops after which a person let the work go on.
+        cultivar: How the vine grows: a preset of the vineyard.
     """
 
     seed: int
@@ -149,11 +159,17 @@ class VineRun:
     glance_s: float = GLANCE_S
     glances: int = 0
     stops: int = 0
+    cultivar: str = USUAL
 
     @property
     def key(self) -> tuple[object, ...]:
         """What tells it from other runs."""
-        return self.training, self.preset, self.review, self.decision_s, self.glance_s, self.seed
+        return self.training, self.preset, self.review, self.decision_s, self.glance_s, self.cultivar, self.seed
+
+    @property
+    def condition(self) -> str:
+        """In words what it shares with the other vines of its figures."""
+        return condition(self.training, self.cultivar, self.preset, self.review, self.decision_s)
 
     @property
     def person_s(self) -> float:
@@ -448,6 +464,7 @@ def prune_vine(
     pictures: float = 2.0,
     segmenter: str = "",
     glance_s: float = GLANCE_S,
+    cultivar: str = USUAL,
 ) -> VineRun:
     """Arrive, survey, decide, cut, leave, and judge.
 
@@ -462,12 +479,15 @@ def prune_vine(
         pictures: The camera takes a second while the robot moves.
         segmenter: In place of the configured one.
         glance_s: Look at one of several pictures (s).
+        cultivar: How the vine grows: a preset of the vineyard.
 
     Raises:
         InputError: There is no such preset.
     """
     if preset not in PRESETS:
         raise InputError(f"no world {preset!r}; known are {', '.join(PRESETS)}")
+    if cultivar not in CULTIVARS:
+        raise InputError(f"no cultivar {cultivar!r}; known are {', '.join(CULTIVARS)}")
     began, looks = time.perf_counter(), 0
 
     def watch(loop: ClosedLoop, tracking: Tracking) -> None:
@@ -482,7 +502,7 @@ def prune_vine(
         path, length, world, settings = Path(folder) / "trace", VineyardConfig().vine_spacing, PRESETS[preset], {}
         if preset != "calm":
             world, settings = calibrated(world), _in_the_field(world)
-        settings |= _one_vine(training, length)
+        settings |= _one_vine(training, length, cultivar)
         config = sim_config(Path(folder) / "vine.toml", pictures, world, settings)
         with ClosedLoop(seed, path, config, "hierarchy", watch, segmenter=segmenter) as loop:
             before = row_of(loop)
@@ -518,6 +538,7 @@ def prune_vine(
         glance_s=glance_s,
         glances=reviewer.glances,
         stops=visit.stops,
+        cultivar=cultivar,
     )
 
 
@@ -529,9 +550,9 @@ def _in_the_field(world: WorldConfig) -> dict[str, dict[str, object]]:
     }
 
 
-def _one_vine(training: Training, length: float) -> dict[str, dict[str, object]]:
+def _one_vine(training: Training, length: float, cultivar: str) -> dict[str, dict[str, object]]:
     """Settings of a row of one vine, whose edge is in the middle of the first picture."""
-    row: dict[str, object] = {"vines": 1, "first_vine_x": _CAMERA_AHEAD + length / 2}
+    row: dict[str, object] = {"preset": cultivar, "vines": 1, "first_vine_x": _CAMERA_AHEAD + length / 2}
     if training == "spur":
         return {"vineyard": row}
     return {"vineyard": {**row, "training": "guyot"}, "perception.rule": {"system": "guyot"}}
@@ -640,7 +661,7 @@ def tell(run: VineRun) -> None:
     outcomes = ", ".join(f"{count[outcome]} {outcome}" for outcome in OUTCOMES if count[outcome]) or "no cut asked for"
     harmed = sum(bool(cut.harm) for cut in run.cuts)
     print(
-        f"{run.training}, {run.preset}, {run.review} {run.decision_s:g} s, seed {run.seed}: "
+        f"{run.condition}, seed {run.seed}: "
         f"machine {run.machine_s:.0f} s, "
         f"person {run.person_s:.0f} s in {run.decisions} decisions, {run.glances} glances; {outcomes}; "
         f"{harmed} harmed, {run.contacts}+{run.self_contacts} contacts, {run.wall_s:.0f} s of real time"
@@ -658,7 +679,7 @@ def document(runs: Sequence[VineRun], pictures: float, segmenter: str) -> dict[s
     """What is written: the figures by condition, and every vine."""
     groups: dict[str, list[VineRun]] = {}
     for run in runs:
-        groups.setdefault(f"{run.training}, {run.preset}, {run.review} {run.decision_s:g} s", []).append(run)
+        groups.setdefault(run.condition, []).append(run)
     return {
         "pictures_hz": pictures,
         "segmenter": segmenter,
@@ -704,6 +725,9 @@ def main(argv: Sequence[str]) -> int:
     parser.add_argument(
         "--training-system", choices=("spur", "guyot"), default="spur", help="how the vines are (default: spur)"
     )
+    parser.add_argument(
+        "--cultivar", choices=tuple(CULTIVARS), default=USUAL, help="how the vines grow (default: %(default)s)"
+    )
     parser.add_argument("--seed", type=_count, default=3100, help="of the first vine (default: %(default)s)")
     parser.add_argument("--count", type=_positive, default=30, help="vines (default: %(default)s)")
     parser.add_argument(
@@ -730,7 +754,7 @@ def main(argv: Sequence[str]) -> int:
     known = [] if words.json is None else read(words.json)
     runs: list[VineRun] = []
     for seed in range(words.seed, words.seed + words.count):
-        key = (words.training_system, words.preset, words.review, words.decision, words.glance, seed)
+        key = (words.training_system, words.preset, words.review, words.decision, words.glance, words.cultivar, seed)
         found = next((run for run in known if run.key == key), None)
         if found is None:
             found = prune_vine(
@@ -742,6 +766,7 @@ def main(argv: Sequence[str]) -> int:
                 words.pictures,
                 words.segmenter,
                 words.glance,
+                words.cultivar,
             )
             known.append(found)
             # Many vines take hours: what is done is on disk, and the next run goes on from there.

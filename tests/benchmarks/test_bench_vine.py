@@ -14,7 +14,7 @@ from benchmarks.control.cut_truth import STUB, wanted_cuts
 from benchmarks.control.row_report import Cut
 from benchmarks.control.vine_plot import draw_vine
 from bridge.sim import build
-from bridge.sim.vineyard.config import VineyardConfig
+from bridge.sim.vineyard.config import VineyardConfig, load_vineyard
 from bridge.sim.vineyard.grow import grow
 from bridge.sim.vineyard.row import Row
 from rolling_panda import commands as intents
@@ -264,12 +264,12 @@ def test_a_person_looks_at_a_protective_stop_and_the_work_goes_on(monkeypatch, s
 # --- the figures ------------------------------------------------------------------------------------------------------
 
 
-def run(seed=1, outcomes=("right", "refused"), blocked="", harm="", ended="", survey=20.0, decisions=4):
+def run(seed=1, outcomes=("right", "refused"), blocked="", harm="", ended="", survey=20.0, decisions=4, **more):
     stages = dict.fromkeys(bench.VINE_STAGES, 0.0) | {"survey": survey, "decisions": 3.0 * decisions}
     cuts = (Cut("hierarchy", seed, "p", "DONE", "", None, None, 0.0, not harm, harm, True, 2, 0.0),)
     places = tuple(bench.Place(k, "spur cut", blocked, each, "") for k, each in enumerate(outcomes))
     return bench.VineRun(
-        seed, "spur", "calm", "each", 3.0, stages, decisions, {}, cuts, places, 0, 0, 0, {}, ended, 100.0
+        seed, "spur", "calm", "each", 3.0, stages, decisions, {}, cuts, places, 0, 0, 0, {}, ended, 100.0, **more
     )
 
 
@@ -307,7 +307,7 @@ def test_a_run_goes_on_where_the_last_one_stopped_and_its_file_is_drawn(tmp_path
     path = tmp_path / "vine.json"
     assert bench.main(["--seed", "7", "--count", "1", "--json", str(path)]) == 0
     assert bench.main(["--seed", "7", "--count", "2", "--json", str(path)]) == 0
-    assert made == [(seed, "spur", "calm", "each", 3.0, 2.0, "", 0.33) for seed in (7, 8)]
+    assert made == [(seed, "spur", "calm", "each", 3.0, 2.0, "", 0.33, "standard") for seed in (7, 8)]
     document = json.loads(path.read_text())
     assert document["summary"]["spur, calm, each 3 s"]["right"] == pytest.approx(
         {"value": 0.5, "low": 0.15, "high": 0.85, "n": 4}, abs=0.01
@@ -334,6 +334,45 @@ def test_without_vines_there_is_no_picture_of_them(tmp_path: Path):
         draw_vine(tmp_path, Figure())
 
 
+def test_vines_of_another_cultivar_are_figures_of_their_own(tmp_path: Path, monkeypatch, capsys):
+    made = []
+
+    def pruned(seed, *rest):
+        made.append(rest[-1])
+        return run(seed, cultivar=rest[-1])
+
+    monkeypatch.setattr(bench, "prune_vine", pruned)
+    path = tmp_path / "vine.json"
+    for words in ([], ["--cultivar", "vigorous"], ["--cultivar", "vigorous"]):
+        assert bench.main(["--seed", "7", "--count", "1", "--json", str(path), *words]) == 0
+    assert made == ["standard", "vigorous"], "the third run finds its vine in the file"
+    assert set(json.loads(path.read_text())["summary"]) == {"spur, calm, each 3 s", "spur, vigorous, calm, each 3 s"}
+    assert capsys.readouterr().out.count("spur, vigorous, calm, each 3 s, seed 7:") == 2
+    figure = Figure()
+    draw_vine(tmp_path, figure)
+    assert [panel.get_title(loc="left") for panel in figure.axes] == [
+        "spur, calm, each 3 s a decision (1 vines)",
+        "spur, vigorous, calm, each 3 s a decision (1 vines)",
+    ]
+
+
+def test_a_file_from_before_there_were_cultivars_has_vines_of_the_usual_one(tmp_path: Path):
+    path = tmp_path / "vine.json"
+    document = bench.document([run(7)], 2.0, "")
+    for each in document["results"]:
+        del each["cultivar"]
+    path.write_text(json.dumps(document))
+    assert bench.read(path) == [run(7)] and bench.read(path)[0].cultivar == "standard"
+    draw_vine(tmp_path, Figure())
+
+
+def test_a_cultivar_is_the_preset_of_the_vineyard_that_the_robot_stands_in(tmp_path: Path):
+    settings = bench._one_vine("guyot", 1.8, "drooping")
+    got = load_vineyard(bench.sim_config(tmp_path / "vine.toml", 2.0, bench.PRESETS["calm"], settings))
+    assert (got.preset, got.training, got.vines) == ("drooping", "guyot", 1)
+    assert got.cane_droop == bench.CULTIVARS["drooping"].cane_droop != VineyardConfig().cane_droop
+
+
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"results": [{"seed": 1}]}'])
 def test_a_file_of_something_else_is_refused_and_stays(tmp_path: Path, text):
     path = tmp_path / "vine.json"
@@ -347,7 +386,14 @@ def test_a_file_of_something_else_is_refused_and_stays(tmp_path: Path, text):
 
 @pytest.mark.parametrize(
     "words",
-    [["--preset", "hail"], ["--training-system", "bush"], ["--count", "0"], ["--decision", "-1"], ["--decision", "x"]],
+    [
+        ["--preset", "hail"],
+        ["--training-system", "bush"],
+        ["--cultivar", "oak"],
+        ["--count", "0"],
+        ["--decision", "-1"],
+        ["--decision", "x"],
+    ],
 )
 def test_what_it_does_not_know_is_refused_before_anything_runs(words, capsys):
     with pytest.raises(SystemExit):
@@ -358,6 +404,11 @@ def test_what_it_does_not_know_is_refused_before_anything_runs(words, capsys):
 def test_an_unknown_world_is_refused_with_those_that_there_are():
     with pytest.raises(InputError, match="calm, field, storm"):
         bench.prune_vine(1, preset="hail")
+
+
+def test_an_unknown_cultivar_is_refused_with_those_that_there_are():
+    with pytest.raises(InputError, match="'oak'; known are standard, short_internodes, vigorous, drooping"):
+        bench.prune_vine(1, cultivar="oak")
 
 
 # --- whole vines ------------------------------------------------------------------------------------------------------
