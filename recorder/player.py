@@ -18,7 +18,7 @@ _PLAYED = {
     for topic in (
         topics.JOINTS, topics.ODOMETRY, topics.BRIDGE, topics.CONTROLLER, topics.CONTROL, topics.STOPS, topics.PLAN,
         topics.HEARTBEAT, topics.EVENT, topics.CAMERA, topics.POINTS, topics.PICTURES, topics.OBSTACLES, topics.SCENERY,
-        topics.REPORT, topics.PROGRAM,
+        topics.SCENERY_MOTION, topics.REPORT, topics.PROGRAM,
     )
 }  # fmt: skip
 #: While paused, messages of topics at least this fast (Hz) are repeated with this period (s), so that they do not get

@@ -212,6 +212,10 @@ SCENERY = Topic(
     "scenery", perception.Scenery, "bridge", "server", 0.5, "BACKGROUND", "DROP",
     "the simulated row; for display only", latched=True,
 )
+SCENERY_MOTION = Topic(
+    "scenery/motion", perception.SceneryMotion, "bridge", "server", 5, "BACKGROUND", "DROP",
+    "simulated canes near the tool, as wind and arm displace them; when they have moved, for display only",
+)
 REPLAY = Topic(
     "replay/state", supervision.ReplayState, "controller", "server", 10, "INTERACTIVE_HIGH", "DROP",
     "position in the recording that is replayed", latched=True,
@@ -220,7 +224,8 @@ REPLAY = Topic(
 TOPICS: tuple[Topic[Any], ...] = (
     MOTION, TOKEN, CUT, CLOSE_UP_REQUEST, STOP, TELEOP, JOINTS, ODOMETRY, BRIDGE, CONTROLLER, PLAN, REPORT, TIMELINE,
     PROGRAM, HEARTBEAT, EVENT, CAMERA, PREVIEW, PREVIEW_MOTION, POINTS, PICTURES, CLOSE_UP, CUT_SIGHT, OBSTACLES,
-    CAMERA_STATE, LOCALISATION, ROBOT_CALIBRATION, SCENERY, PRESENCE, CONTROL, STOPS, HARDWARE_STOP, REPLAY,
+    CAMERA_STATE, LOCALISATION, ROBOT_CALIBRATION, SCENERY, SCENERY_MOTION, PRESENCE, CONTROL, STOPS, HARDWARE_STOP,
+    REPLAY,
 )
 #: The topic of each type of message.
 TOPIC_OF: dict[type[Any], Topic[Any]] = {topic.message: topic for topic in TOPICS}

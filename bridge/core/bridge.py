@@ -23,18 +23,19 @@ from bridge.core.state_memory import Remembered
 from bridge.core.validator import SILENT_S, CommandValidator, Fence
 from rolling_panda import messages as m
 from rolling_panda import reasons
-from rolling_panda.messages.perception import Capsule, CloseUpRequest, Scenery
+from rolling_panda.messages.perception import Capsule, CloseUpRequest, MovedCapsule, Scenery, SceneryMotion
 from rolling_panda.messages.robot import CameraFrame
 from rolling_panda.messages.supervision import StopState
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import Limits
 from rolling_panda.model.wire_values import actuated, arm_torques
 from rolling_panda.runtime.latest_file import KeptValue
-from rolling_panda.topics import BRIDGE, CLOSE_UP_REQUEST, CUT, MOTION, ODOMETRY, TOKEN
+from rolling_panda.topics import BRIDGE, CLOSE_UP_REQUEST, CUT, MOTION, ODOMETRY, SCENERY_MOTION, TOKEN
 from rolling_panda.transport.rejections import Rejections
 
 TICK_S = 0.001
 _ODOMETRY_TICKS = round(1 / ODOMETRY.rate_hz / TICK_S)
+_SCENERY_MOTION_TICKS = round(1 / SCENERY_MOTION.rate_hz / TICK_S)
 _STATE_TICKS = round(1 / BRIDGE.rate_hz / TICK_S)
 # Speed limits of wheels and joints for closing the blades (rad/s): 5 mm/s at the axle, and the motion that holding
 # the tool in place needs.
@@ -52,6 +53,7 @@ _MOST_TORQUE = 1000.0
 _MOVING = 0.01
 
 SceneryOf = Callable[[], tuple[int, tuple[Capsule, ...]]]
+SceneryMotionOf = Callable[[], tuple[int, tuple[MovedCapsule, ...]] | None]
 
 
 @dataclass(frozen=True)
@@ -63,13 +65,15 @@ class BridgeOutputs:
     state: m.BridgeState | None = None
     frame: CameraFrame | None = None
     scenery: Scenery | None = None
+    scenery_motion: SceneryMotion | None = None
     events: tuple[m.LogEvent, ...] = ()
     stops: StopState | None = None
 
     @property
     def messages(self) -> list[m.Message]:
         """All of them, in the order in which they are sent."""
-        each = (self.joints, self.odometry, self.state, self.frame, self.stops, self.scenery, *self.events)
+        states = (self.joints, self.odometry, self.state, self.frame, self.stops)
+        each = (*states, self.scenery, self.scenery_motion, *self.events)
         return [message for message in each if message is not None]
 
 
@@ -94,6 +98,7 @@ class BridgeCore:
         relaxed_limits: tuple[m.Reason, ...] = (),
         draw: Callable[[], str] = draw_id,
         calibration: Calibration | None = None,
+        scenery_motion: SceneryMotionOf | None = None,
     ) -> None:
         """Start with the watchdog tripped, at rest, without a stop.
 
@@ -110,6 +115,8 @@ class BridgeCore:
             relaxed_limits: Safety limits that the configuration sets less strictly than usual, to report.
             draw: Draws the random part of the bridge's own stops.
             calibration: Of wheels and joints; None takes them to be as drawn.
+            scenery_motion: Revision and displaced rods of the simulated row when they have moved, else None; None on a
+                real robot.
         """
         self.robot = robot
         self._calibration = calibration or Calibration(odometer.drive.sizes, float(limits.velocity[0]))
@@ -118,6 +125,7 @@ class BridgeCore:
         self._odometer = odometer
         self._scenery = scenery
         self._scenery_revision = -1
+        self._scenery_motion = scenery_motion
         self._memory = memory or KeptValue(Remembered())
         before = self._memory.value
         self._fence = Fence(before.epoch, before.token)
@@ -348,7 +356,7 @@ class BridgeCore:
         self._events.append(told)
 
     def _outputs(self, now: float) -> BridgeOutputs:
-        joints = odometry = state = frame = None
+        joints = odometry = state = frame = motion = None
         ticks = self._ticks
         if ticks % self._joint_ticks == 0:
             self._follow_odometry(now)
@@ -375,6 +383,8 @@ class BridgeCore:
                 hardware=self._latch.hardware,
             )
         scenery = None if self._scenery is None else self._scenery_message(self._scenery, now)
+        if self._scenery_motion is not None and ticks % _SCENERY_MOTION_TICKS == 0:
+            motion = self._scenery_motion_message(self._scenery_motion, now)
         events, self._events = self._events, []
         return BridgeOutputs(
             joints,
@@ -382,6 +392,7 @@ class BridgeCore:
             state,
             frame,
             scenery,
+            motion,
             tuple(m.LogEvent(header=m.Header(now), process="bridge", reason=told) for told in events),
             stops,
         )
@@ -486,3 +497,10 @@ class BridgeCore:
             return None
         self._scenery_revision = revision
         return Scenery(header=m.Header(now, "map"), revision=revision, capsules=capsules)
+
+    def _scenery_motion_message(self, motion: SceneryMotionOf, now: float) -> SceneryMotion | None:
+        """What wind and arm have displaced, when it has moved."""
+        moved = motion()
+        if moved is None:
+            return None
+        return SceneryMotion(header=m.Header(now, "map"), revision=moved[0], moved=moved[1])

@@ -74,6 +74,7 @@ def simulated_bridge(
         memory,
         widened,
         calibration=calibration,
+        scenery_motion=robot.scenery_motion,
     )
 
 

@@ -442,12 +442,43 @@ class Scenery(Message, frozen=True, kw_only=True):
     Attributes:
         header: `frame_id` is map.
         revision: Increases when something is severed.
-        capsules: All parts of the row.
+        capsules: All parts of the row, and the severed wood on the ground.
     """
 
     header: Header
     revision: Count
     capsules: tuple[Capsule, ...]
+
+
+class MovedCapsule(Struct, frozen=True, forbid_unknown_fields=True):
+    """Where a capsule of the simulated row is now.
+
+    Attributes:
+        index: Of the capsule in `Scenery`.
+        start: First end of the axis (m).
+        end: Second end of the axis (m).
+    """
+
+    index: Count
+    start: Vector3
+    end: Vector3
+
+
+class SceneryMotion(Message, frozen=True, kw_only=True):
+    """Simulated bridge → server: canes near the tool that wind and arm have displaced, for display only.
+
+    Each message has all of them: capsules that it does not name are at rest, as `Scenery` has them. It is sent when one
+    has moved by 3 mm, and never in a world without wind and elastic canes.
+
+    Attributes:
+        header: `frame_id` is map.
+        revision: That of the `Scenery` with these capsules.
+        moved: The displaced capsules.
+    """
+
+    header: Header
+    revision: Count
+    moved: tuple[MovedCapsule, ...]
 
 
 class Obstacles(Message, frozen=True, kw_only=True):

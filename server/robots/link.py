@@ -94,6 +94,7 @@ class RobotLink:
         """The program of each process, of the server too."""
         transport.subscribe(topics.PROGRAM, self._on_program)
         self.scenery = transport.slot(topics.SCENERY)
+        self.scenery_motion = transport.slot(topics.SCENERY_MOTION)
         self.obstacles = transport.slot(topics.OBSTACLES)
         self.camera_state = transport.slot(topics.CAMERA_STATE)
         self.robot_calibration = transport.slot(topics.ROBOT_CALIBRATION)

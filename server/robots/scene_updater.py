@@ -84,6 +84,8 @@ class SceneUpdater:
         if (scenery := link.scenery.peek()) is not None and scenery is not self._scenery:
             self._scenery = scenery
             scene.show_row(scenery.message, now)
+        if (motion := link.scenery_motion.peek()) is not None and scene.shows_row:
+            scene.show_row_motion(motion.message)
         if (obstacles := link.obstacles.peek()) is not None and obstacles is not self._obstacles:
             self._obstacles = obstacles
             scene.show_plant(obstacles.message)

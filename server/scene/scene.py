@@ -8,7 +8,7 @@ import viser
 
 from rolling_panda import messages as m
 from rolling_panda.messages.page import CameraPreset, Layer, PagePoint
-from rolling_panda.messages.perception import Capsule, Obstacles, Scenery, UndecidedSite
+from rolling_panda.messages.perception import Capsule, Obstacles, Scenery, SceneryMotion, UndecidedSite
 from rolling_panda.messages.supervision import GizmoAxes
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.map_frame import MapFrame
@@ -29,6 +29,7 @@ from server.scene.cut_canes import (
 from server.scene.gizmo import SceneGizmos
 from server.scene.markers import PointMarkers
 from server.scene.meshes import capsules_mesh, color_of, drawn_kinds, on_the_ground
+from server.scene.moved_canes import MovedCanes
 from server.scene.outdoors import VineNumbers, draw_outdoors
 from server.scene.picking import (
     ClickListener,
@@ -116,6 +117,7 @@ class Scene:
         self.cameras = SceneCameras(self._server)
         self.trail = ToolTrail(self._server)
         self.falling = FallingPieces(self._server)
+        self._moved = MovedCanes(self._server, "/row")
         self._distance_tool = DistanceTool(solids.end_ball)
         self.robot = SceneRobot(self._server, model, solids.robot)
         self.cameras.hides(self.robot.rods)
@@ -136,7 +138,18 @@ class Scene:
             removed = removed_capsules(before.capsules, scenery.capsules)
             if removed:
                 self.falling.drop("/row", removed, now, dim=True)
-        self._show_capsules("/row", scenery.capsules, self._rods, dim=True)
+        if self._show_capsules("/row", scenery.capsules, self._rods, dim=True):
+            self._moved.restart()
+
+    def show_row_motion(self, motion: SceneryMotion) -> None:
+        """Draw the canes of the simulated row that wind and arm have displaced."""
+        if self._row is not None:
+            self._moved.show(self._row, motion)
+
+    @property
+    def shows_row(self) -> bool:
+        """Whether any view shows the simulated row."""
+        return self._shows({"simulated"})
 
     def show_plant(self, seen: Obstacles) -> None:
         """Draw posts, trunks, cordons, wires and canes as perceived; unchanged kinds are not sent again."""
@@ -149,7 +162,9 @@ class Scene:
         drawn: dict[str, list[Capsule]],
         dim: bool = False,
         grow: float = 0.0,
-    ) -> None:
+    ) -> bool:
+        """Draw the kinds that have changed; returns whether any has."""
+        changed = False
         by_kind: dict[str, list[Capsule]] = {kind: [] for kind in drawn_kinds()}
         for capsule in capsules:
             if capsule.kind in by_kind:
@@ -157,6 +172,7 @@ class Scene:
         for kind in drawn_kinds():
             if by_kind[kind] == drawn.get(kind, []):
                 continue
+            changed = True
             drawn[kind] = by_kind[kind]
             if by_kind[kind]:
                 vertices, faces = capsules_mesh(kind, by_kind[kind], grow)
@@ -169,6 +185,7 @@ class Scene:
                 )
             else:
                 self._server.scene.remove_by_name(f"{root}/{kind}")
+        return changed
 
     def show_points(self, points: tuple[PagePoint, ...], sites: tuple[UndecidedSite, ...] = ()) -> None:
         """Draw the pruning points by their state, and the sites that a person has to decide."""
@@ -292,8 +309,11 @@ class Scene:
     @property
     def shows_camera_frames(self) -> bool:
         """Whether any view shows the frustum or the point cloud of the eye-in-hand camera."""
+        return self._shows({"camera", "cloud"})
+
+    def _shows(self, layers: set[Layer]) -> bool:
         owners = {self.views.owner(client_id) for client_id in self._server.get_clients()}
-        return any(self._layers_of(owner) & {"camera", "cloud"} for owner in owners if owner is not None)
+        return any(self._layers_of(owner) & layers for owner in owners if owner is not None)
 
     def show_camera_frame(self, frame: DecodedFrame, wxyz: Array, position: Array) -> None:
         """Draw a frame of the eye-in-hand camera, taken from a pose in map, on the views that show it."""
@@ -316,7 +336,8 @@ class Scene:
         """`owner` clicked along a ray (map); returns both points after every second click."""
         ray, layers = Ray(origin, direction), self._layers_of(owner)
         rods = [rod for rows in self._plant.values() for rod in rows if "plant" in layers]
-        rods += [rod for rows in self._rods.values() for rod in rows if "simulated" in layers]
+        if self._row is not None and "simulated" in layers:
+            rods += self._moved.as_drawn(self._row)
         hit = nearest((hit_rods(ray, rods), hit_triangles(ray, self.robot.triangles(), "robot"), hit_ground(ray)))
         if hit is None:
             return None

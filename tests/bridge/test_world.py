@@ -329,6 +329,45 @@ def test_a_severed_cane_that_hangs_stays_beside_where_it_stood_and_the_stub_ends
     assert fallen.row.rods[1] is None and len(fallen.row.rods) == 2
 
 
+def test_a_severed_cane_that_falls_lies_on_the_ground_as_the_seed_has_it() -> None:
+    sim, _ = bitten(CALM, 3)
+    whole, _ = bitten(replace(CALM, blade_failures=1.0), 3)
+    cut, tip = sim.row.lying
+    (stub, _), (long, beyond) = sim.row.rods, whole.row.rods
+    assert stub is not None and long is not None and beyond is not None
+
+    def length(rod: Rod) -> float:
+        return float(np.linalg.norm(rod.end - rod.start))
+
+    assert length(cut) == pytest.approx(length(long) - length(stub)) and length(tip) == pytest.approx(length(beyond))
+    assert cut.end == pytest.approx(tip.start)
+    assert [rod.start[2] for rod in sim.row.lying] == pytest.approx([rod.start_radius for rod in sim.row.lying])
+    fell = np.mean([stub.end, beyond.end], axis=0) - np.mean([cut.start, tip.end], axis=0)
+    assert np.abs(fell[:2]).max() < 1e-9 + 0.1 and fell[2] > 0.5
+    lengthwise = (tip.end - cut.start)[:2]
+    azimuth = Wood(CALM, 3).lies()
+    assert np.arctan2(*lengthwise[::-1]) % (2 * np.pi) == pytest.approx(azimuth)
+    shown = sim.scenery()[1]
+    assert [each.start for each in shown[-2:]] == [tuple(rod.start) for rod in sim.row.lying]
+    assert bitten(replace(CALM, hanging=1.0), 3)[0].row.lying == ()
+
+
+def test_wood_on_the_ground_is_in_the_picture_as_background_and_the_wind_does_not_move_it() -> None:
+    row = grow(VineyardConfig(vines=1), 4)
+    first = next(index for index, rod in row.standing() if rod.cane >= 0)
+    gone, lies = row.sever(first, 0.5), row.sever(first, 0.5, lies=0.7)
+    assert [rod is None for rod in lies.rods] == [rod is None for rod in gone.rods] and len(lies.lying) > 10
+    assert Wind(row, 0.02, 4).blown(lies, 1.0).lying == lies.lying
+    T = looking_left(0.3, 0.0, 1.0)
+    T[:3, :3] = T[:3, :3] @ [[1.0, 0.0, 0.0], [0.0, 0.6, 0.8], [0.0, -0.8, 0.6]]
+    camera = Camera(LENS)
+    before, after = camera.render(gone, T), camera.render(lies, T)
+    wood = np.any(before.color != after.color, axis=2)
+    assert wood.sum() > 40
+    assert set(after.labels[wood]) == {0} and (after.rods[wood] == -1).all()
+    assert np.array_equal(before.labels[~wood], after.labels[~wood])
+
+
 @pytest.mark.long
 def test_the_same_seed_gives_the_same_bytes_in_a_storm_and_another_seed_others(tmp_path: Path) -> None:
     text = resource("assets/config/sim.toml").read_text().replace("width = 848", "width = 64")

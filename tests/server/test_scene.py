@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rolling_panda import messages as m
-from rolling_panda.messages.perception import Capsule, Obstacles, Scenery
+from rolling_panda.messages.perception import Capsule, MovedCapsule, Obstacles, Scenery, SceneryMotion
 from rolling_panda.model.robot import RobotModel
 from server.scene.cut_canes import FALLS_COLOR
 from server.scene.scene import Scene
@@ -168,3 +168,73 @@ def test_what_the_simulator_severed_falls_too_and_another_row_does_not(scene: Dr
     scene.show_row(row(40, post), now=103.0)
     scene.show_row(row(0, foot, tip, post), now=104.0)
     assert falling(scene, "row") is None
+
+
+# --- what wind and arm displace --------------------------------------------------------------------------------------
+
+STANDS = (
+    Capsule("cane", (0.2, 0.8, 0.5), (0.2, 0.8, 1.0), 0.005, 0.005),
+    Capsule("post", (1.0, 0.8, 0.0), (1.0, 0.8, 2.0), 0.05, 0.05),
+    Capsule("cane", (0.2, 0.8, 1.0), (0.2, 0.8, 1.5), 0.005, 0.004),
+)
+
+
+def blown(x: float, *indices: int, revision: int = 0) -> SceneryMotion:
+    """These capsules, so far aside at their ends."""
+    moved = tuple(MovedCapsule(index, STANDS[index].start, (0.2 + x, 0.8, STANDS[index].end[2])) for index in indices)
+    return SceneryMotion(header=m.Header(), revision=revision, moved=moved)
+
+
+def reach(scene: Drawn, name: str) -> tuple[float, float]:
+    """The lowest and the highest place of a mesh of the simulated row (m)."""
+    heights = np.asarray(scene.handle(f"/row/{name}").vertices)[:, 2]
+    return float(heights.min()), float(heights.max())
+
+
+def test_blown_canes_are_drawn_where_they_are_and_no_longer_where_they_stood(scene: Drawn) -> None:
+    scene.show_row_motion(blown(0.03, 2))
+    scene.show_row(row(0, *STANDS), now=100.0)
+    assert late_view(scene).isdisjoint({"/row/moved cane"})
+    scene.show_row_motion(blown(0.03, 2))
+    assert np.asarray(scene.handle("/row/moved cane").vertices)[:, 0].max() == pytest.approx(0.23, abs=0.01)
+    assert reach(scene, "moved cane") == (pytest.approx(1.0, abs=0.01), pytest.approx(1.5, abs=0.01))
+    assert reach(scene, "cane")[1] == pytest.approx(1.0, abs=0.01)
+    scene.show_row_motion(blown(0.0))
+    assert scene.handle("/row/moved cane") is None and reach(scene, "cane")[1] == pytest.approx(1.5, abs=0.01)
+
+
+def test_of_canes_that_go_on_swaying_only_the_vertices_are_sent_again(scene: Drawn) -> None:
+    scene.show_row(row(0, *STANDS), now=100.0)
+    scene.show_row_motion(blown(0.03, 0, 2))
+    mesh, rest, kept = scene.handle("/row/moved cane"), scene.handle("/row/cane"), None
+    still = np.array(rest.vertices)
+    for x in (0.02, 0.01, -0.01):
+        scene.show_row_motion(blown(x, 0, 2))
+        assert scene.handle("/row/moved cane") is mesh and scene.handle("/row/cane") is rest
+        assert np.asarray(mesh.vertices)[:, 0].min() == pytest.approx(min(0.2, 0.2 + x), abs=0.01)
+        kept = kept or len(scene.kept())
+        assert len(scene.kept()) == kept, "a view that opens later gets the newest motion alone"
+    assert np.array_equal(rest.vertices, still)
+
+
+def test_a_motion_of_another_revision_waits_for_its_row_and_a_cut_row_begins_at_rest(scene: Drawn) -> None:
+    scene.show_row(row(0, *STANDS), now=100.0)
+    scene.show_row_motion(blown(0.03, 2))
+    drawn = np.array(scene.handle("/row/moved cane").vertices)
+    scene.show_row_motion(blown(0.02, 0, revision=1))
+    assert np.array_equal(scene.handle("/row/moved cane").vertices, drawn)
+    scene.show_row(row(1, *STANDS[:2]), now=101.0)
+    assert scene.handle("/row/moved cane") is None and reach(scene, "cane")[1] == pytest.approx(1.0, abs=0.01)
+    scene.show_row_motion(blown(0.02, 0, revision=1))
+    assert reach(scene, "moved cane") == (pytest.approx(0.5, abs=0.01), pytest.approx(1.0, abs=0.01))
+
+
+def test_a_row_at_rest_that_is_told_again_sends_nothing(scene: Drawn) -> None:
+    scene.show_row(row(0, *STANDS), now=100.0)
+    before = [id(each) for each in scene.kept()]
+    scene.show_row(row(0, *STANDS), now=102.0)
+    assert [id(each) for each in scene.kept()] == before
+    scene.show_row_motion(blown(0.03, 2))
+    mesh = scene.handle("/row/moved cane")
+    scene.show_row(row(0, *STANDS), now=104.0)
+    assert scene.handle("/row/moved cane") is mesh, "nor does it end a motion"

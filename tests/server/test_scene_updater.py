@@ -6,7 +6,9 @@ import msgspec
 import numpy as np
 import pytest
 
+from rolling_panda import messages as m
 from rolling_panda import topics
+from rolling_panda.messages.perception import Capsule, MovedCapsule, Scenery, SceneryMotion
 from server.config import ServerConfig
 from tests.server.test_camera_view import HEIGHT, WIDTH, frame
 from tests.server.test_client_messages import CAMERA, CLICK, DRAG, GRAB, POINTER
@@ -125,6 +127,22 @@ def test_a_picture_of_the_camera_is_drawn_for_who_wants_it(server):
         never(other_view, lambda message: message.get("name") in ("/camera", "/cloud"))
         page.send('{"type":"ShowLayers","layers":[]}')
         hear(view, lambda message: message["type"] == "RemoveSceneNodeMessage" and message["name"] == "/cloud")
+
+
+def test_swaying_canes_are_sent_only_while_a_view_shows_the_simulated_row(server):
+    foot = Capsule("cane", (0.2, 0.8, 0.5), (0.2, 0.8, 1.0), 0.005, 0.005)
+    moved = (MovedCapsule(0, (0.2, 0.8, 0.5), (0.22, 0.8, 1.0)),)
+    server.wire.deliver(topics.SCENERY, Scenery(header=m.Header(), revision=0, capsules=(foot,)))
+    server.wire.deliver(topics.SCENERY_MOTION, SceneryMotion(header=m.Header(), revision=0, moved=moved))
+
+    def of_motion(message):
+        return message.get("name") == "/row/moved cane"
+
+    with page_and_view(server) as (page, view):
+        hear(view, lambda message: message.get("name") == "/plant")
+        never(view, of_motion)
+        page.send('{"type":"ShowLayers","layers":["simulated"]}')
+        hear(view, of_motion)
 
 
 def test_a_drag_while_holding_does_not_wait_for_the_loops_turn_and_many_drags_are_not_all_told():

@@ -30,9 +30,10 @@ class RodMesh:
 
     def __init__(self, row: Row) -> None:
         """Mesh every standing rod."""
-        # Rods of the rows behind have indices after those of this row.
-        standing = [*row.standing(), *enumerate(row.backdrop, len(row.rods))]
-        count = len(row.rods) + len(row.backdrop)
+        # What is visible only has indices after those of this row.
+        visible = (*row.backdrop, *row.lying)
+        standing = [*row.standing(), *enumerate(visible, len(row.rods))]
+        count = len(row.rods) + len(visible)
         self.revision = row.revision
         self.reachable = len(row.rods)
         self.kind = np.zeros(count, np.uint8)

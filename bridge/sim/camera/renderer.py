@@ -29,7 +29,7 @@ class RgbdImage:
     Attributes:
         color: H×W×3, RGB.
         depth: H×W, measured along the optical axis (m); 0 = invalid.
-        labels: H×W, true class, index in `WOOD_CLASSES`; the rows behind are background.
+        labels: H×W, true class, index in `WOOD_CLASSES`; the rows behind and wood on the ground are background.
         rods: H×W, index in `Row.rods`, -1 elsewhere; ground truth for benchmarks.
     """
 

@@ -45,12 +45,12 @@ class CutResult:
         severed = (SeveredRod(i.index, rod, i.along, rod.at(i.along)[0]) for i, rod in rods if rod is not None)
         return replace(self, severed=tuple(severed))
 
-    def applied(self, row: Row, hangs: Array | None = None) -> Row:
+    def applied(self, row: Row, hangs: Array | None = None, lies: float | None = None) -> Row:
         """A row with the same rods after the cut; arguments as of `Row.sever`."""
         for item in self.severed:
             # An earlier cut may have removed the rod.
             if row.rods[item.index] is not None:
-                row = row.sever(item.index, item.along, hangs)
+                row = row.sever(item.index, item.along, hangs, lies)
         return row
 
 

@@ -5,7 +5,8 @@ Physics assumptions in addition to those of `bridge.sim.robot.model`:
   of stiff ones changes the wheel speeds after the friction solve, and the base slides by centimetres. Gravity and
   Coriolis torques of the arm are compensated, as on the Panda.
 - Encoders are exact, unless the world has offsets and slip. Odometry errors come from slip and from contact with wood.
-- Severed wood disappears at once, unless it hangs in the wires. Wind moves canes before the camera and the blades.
+- Severed wood lies on the ground at once, unless it hangs in the wires. There only the camera meets it.
+- Wind moves canes before the camera and the blades.
 - Canes push back where the world has elastic ones. `bridge.sim.robot.touch` has the arm's estimate of torques by touch.
 """
 
@@ -30,18 +31,17 @@ from bridge.sim.robot.trace import CUTTER, TraceWriter
 from bridge.sim.vineyard.row import Row
 from bridge.sim.world.canes import Canes, Push
 from bridge.sim.world.config import CALM, WorldConfig
+from bridge.sim.world.display import RowMotion, capsules
 from bridge.sim.world.errors import draw_errors
 from bridge.sim.world.ground import Ground
 from bridge.sim.world.slip import Slip
 from bridge.sim.world.wind import Wind
 from bridge.sim.world.wood import Wood
 from rolling_panda import reasons
-from rolling_panda.messages.perception import Capsule
+from rolling_panda.messages.perception import Capsule, MovedCapsule
 from rolling_panda.model.differential_drive import Array
-from rolling_panda.model.wire_values import vector3
 from rolling_panda.reasons import text_of
 
-_DISPLAYED = frozenset({"post", "trunk", "cordon", "spur", "cane", "node", "wire", "hose", "old cut"})
 _WHEELS_ON_FLOOR = 3
 _SETTLING_STEPS = 200
 #: On uneven ground the robot settles at most so often, until no wheel is pressed deeper into the ground (m).
@@ -156,6 +156,8 @@ class SimulatedRobot:
         self._M = np.zeros((self._plant.model.nv, self._plant.model.nv))
         self._spheres = touching_spheres(self._plant, config.opening)
         self._canes = Canes(1e9 * world.cane_modulus, self._spheres.radii, STEP_S) if world.cane_modulus > 0.0 else None
+        moves = self._wind is not None or self._canes is not None
+        self._motion = RowMotion(row, self._wind, self._canes) if moves else None
         self._pushes: Sequence[Push] = ()
         self._felt = ExternalTorque(self._plant, seed)
         self._servos = self._make_servos()
@@ -281,8 +283,18 @@ class SimulatedRobot:
     def scenery(self) -> tuple[int, tuple[Capsule, ...]]:
         """Revision of the row, and the row as capsules for display."""
         if self._scenery[0] != self.row.revision:
-            self._scenery = (self.row.revision, _capsules(self.row))
+            self._scenery = (self.row.revision, capsules(self.row))
         return self._scenery
+
+    def scenery_motion(self) -> tuple[int, tuple[MovedCapsule, ...]] | None:
+        """Revision of the row, and its capsules near the tool that wind and arm have displaced, for display.
+
+        None when none has moved since the last call. In a calm world none ever has.
+        """
+        if self._motion is None:
+            return None
+        moved = self._motion.changed(self.row, self._data.site_xpos[self._plant.tool], self.time)
+        return None if moved is None else (self.row.revision, moved)
 
     def _make_servos(self) -> VelocityServos:
         config = self._config
@@ -402,7 +414,8 @@ class SimulatedRobot:
         tool = self.true_tool()
         nearest = wood_in_plane(self._blown(tool), tool)[:1].tolist()
         result = self._bite(tool)
-        self.row = result.applied(self.row, self._wood.hangs() if result.severed else None)
+        if result.severed:
+            self.row = result.applied(self.row, self._wood.hangs(), self._wood.lies())
         # Blades that met say so, also when the wood hangs by its bark.
         done = bool(result.severed) or result.detail == reasons.blades_met()
         self._cutter.finish("DONE" if done else "FAILED_NOT_CUT", result.detail, result.jammed)
@@ -465,11 +478,3 @@ class SimulatedRobot:
         row["cutter"] = CUTTER.index(self._cutter.state)
         row["contacts"], row["self_contacts"] = self.contacts, self.self_contacts
         trace.commit()
-
-
-def _capsules(row: Row) -> tuple[Capsule, ...]:
-    return tuple(
-        Capsule(rod.kind, vector3(rod.start), vector3(rod.end), float(rod.start_radius), float(rod.end_radius))
-        for _, rod in row.standing()
-        if rod.kind in _DISPLAYED
-    )

@@ -63,7 +63,7 @@ class Vineyard(msgspec.Struct, frozen=True):
 
 
 def save(path: Path, vineyard: Vineyard) -> None:
-    """Write a row; an uncut one with its truth.
+    """Write a row without what lies on the ground; an uncut one with its truth.
 
     Args:
         path: File to write.

@@ -58,17 +58,19 @@ class Row:
         rods: All rods; None for removed ones.
         revision: Number of cuts.
         backdrop: Rods of the rows behind: visible only.
+        lying: Severed wood on the ground: visible only.
     """
 
     rods: tuple[Rod | None, ...]
     revision: int = 0
     backdrop: tuple[Rod, ...] = ()
+    lying: tuple[Rod, ...] = ()
 
     def standing(self) -> Iterable[tuple[int, Rod]]:
         """Index and rod of all that are not removed."""
         return ((index, rod) for index, rod in enumerate(self.rods) if rod is not None)
 
-    def sever(self, index: int, fraction: float, hangs: Array | None = None) -> "Row":
+    def sever(self, index: int, fraction: float, hangs: Array | None = None, lies: float | None = None) -> "Row":
         """The row after a cut through rod `index` at `fraction` of its length.
 
         Args:
@@ -76,6 +78,7 @@ class Row:
             fraction: Of its length.
             hangs: How far all that it carried beyond is moved (3, m), where it hangs in the wires; None where it falls
                 and is gone.
+            lies: Azimuth of what falls, on the ground where it then lies (rad, world); None where it is taken away.
 
         Raises:
             IndexError: The rod is removed or does not exist.
@@ -87,6 +90,10 @@ class Row:
         gone = self._beyond(index, cut, fraction)
         rods = [None if i in gone else rod for i, rod in enumerate(self.rods)]
         rods[index] = replace(cut, end=point, end_radius=radius)
+        lying = self.lying
+        if hangs is None and lies is not None:
+            fallen = [rod for rod in (self.rods[i] for i in sorted(gone)) if rod is not None]
+            lying += _laid([replace(cut, start=point, start_radius=radius), *fallen], lies)
         if hangs is not None:
             for i in gone:
                 rod = self.rods[i]
@@ -95,7 +102,7 @@ class Row:
                 rods[i] = replace(rod, start=rod.start + hangs, end=rod.end + hangs, parent=parent, hanging=True)
             start, end = point + hangs, cut.end + hangs
             rods.append(replace(cut, start=start, end=end, start_radius=radius, parent=-1, hanging=True))
-        return Row(tuple(rods), self.revision + 1, self.backdrop)
+        return Row(tuple(rods), self.revision + 1, self.backdrop, lying)
 
     def _beyond(self, index: int, cut: Rod, fraction: float) -> set[int]:
         """Indices of all rods that a rod carries beyond a fraction of its length."""
@@ -109,3 +116,22 @@ class Row:
                 if along > fraction:
                     gone.add(child)
         return gone
+
+
+def _laid(piece: list[Rod], azimuth: float) -> tuple[Rod, ...]:
+    """A piece of wood on flat ground under where it stood; its first rod begins at the cut."""
+    ends = np.array([(rod.start, rod.end) for rod in piece]).reshape(-1, 3)
+    root = ends[0]
+    tip = ends[int(np.argmax(np.linalg.norm(ends - root, axis=1)))]
+    along = (tip - root) / max(float(np.linalg.norm(tip - root)), 1e-9)
+    down = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+    # The shortest turn that lays it down; then all of it sinks onto the ground.
+    axis, cosine = np.cross(along, down), float(along @ down)
+    turned = ends - root
+    turned = turned + np.cross(axis, turned) + np.cross(axis, np.cross(axis, turned)) / max(1.0 + cosine, 1e-6)
+    turned[:, :2] += (ends.mean(axis=0) - turned.mean(axis=0))[:2]
+    turned[:, 2] = np.array([(rod.start_radius, rod.end_radius) for rod in piece]).ravel()
+    return tuple(
+        replace(rod, start=start, end=end, parent=-1)
+        for rod, (start, end) in zip(piece, turned.reshape(-1, 2, 3), strict=True)
+    )

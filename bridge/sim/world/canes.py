@@ -22,8 +22,10 @@ _SHORTEST = 0.05
 _BACK_S, _LOOK_S = 0.05, 0.02
 #: Canes within this distance of a part are near (m): nothing moves as far between two looks.
 _NEAR = 0.08
+#: A cane that is displaced by less stands as it grew (m), for display.
+_STRAIGHT = 1e-4
 #: Numbers of a cane, or of a lateral shoot on it: vine, spur, cane, organ.
-_Numbers = tuple[int, int, int, int]
+Numbers = tuple[int, int, int, int]
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,8 @@ class Canes:
         self._modulus, self._radii = modulus, radii
         self._relax, self._every = math.exp(-dt / _BACK_S), max(1, round(_LOOK_S / dt))
         self._revision, self._steps = -1, 0
-        self._bent: dict[_Numbers, Array] = {}
+        self._bent: dict[Numbers, Array] = {}
+        self._touched: dict[Numbers, float] = {}
 
     def push(self, row: Row, centers: Array) -> list[Push]:
         """Forces on the parts after one time step.
@@ -72,12 +75,17 @@ class Canes:
             bent *= self._relax
         return self._touch(centers) if len(self._near) else []
 
+    def bends(self) -> dict[Numbers, tuple[Array, float]]:
+        """Displacement (3, m) of each bent cane or lateral, and the length along it at which it is (m)."""
+        least = _STRAIGHT**2
+        return {numbers: (bent, self._touched[numbers]) for numbers, bent in self._bent.items() if bent @ bent > least}
+
     def _read(self, row: Row) -> None:
         """Rods of canes and laterals, with the length of the same below each."""
         self._revision, self._steps = row.revision, 0
         rods = [(index, rod) for index, rod in row.standing() if rod.cane >= 0 and rod.kind != "background"]
         self._numbers = [(rod.vine, rod.spur, rod.cane, rod.organ) for _, rod in rods]
-        thick: dict[_Numbers, float] = {}
+        thick: dict[Numbers, float] = {}
         below: list[float] = []
         beyond: dict[tuple[int, int], float] = {}
         for (index, rod), numbers in zip(rods, self._numbers, strict=True):
@@ -114,7 +122,7 @@ class Canes:
     def _touch(self, centers: Array) -> list[Push]:
         gaps, offset, place = self._gaps(centers, self._near)
         pushes: list[Push] = []
-        done: set[_Numbers] = set()
+        done: set[Numbers] = set()
         hits = np.argwhere(gaps < 0.0)
         # The deepest of each cane: its rods and the parts overlap one another.
         for part, column in hits[np.argsort(gaps[tuple(hits.T)])].tolist():
@@ -128,14 +136,18 @@ class Canes:
             if distance < 1e-6:
                 continue
             bent = self._bent.get(numbers, np.zeros(3)) + gaps[part, column] / distance * away
-            self._bent[numbers] = bent
-            pushes.append(Push(part, self._force(rod, float(place[part, column]), bent, away / distance)))
+            along = self._along_cane(rod, float(place[part, column]))
+            self._bent[numbers], self._touched[numbers] = bent, along
+            pushes.append(Push(part, self._force(rod, along, bent, away / distance)))
         self._bent = {numbers: bent for numbers, bent in self._bent.items() if bent @ bent > 1e-10}
         return pushes
 
-    def _force(self, rod: int, place: float, bent: Array, away: Array) -> Array:
+    def _along_cane(self, rod: int, place: float) -> float:
+        """Length from the foot of a cane to a place 0…1 on a rod (m), at least the shortest."""
+        return max(float(self._below[rod]) + place * math.sqrt(float(self._square[rod])), _SHORTEST)
+
+    def _force(self, rod: int, length: float, bent: Array, away: Array) -> Array:
         """Force on the part (3, N): along the contact's normal, which friction is left away from."""
-        length = max(float(self._below[rod]) + place * math.sqrt(float(self._square[rod])), _SHORTEST)
         radius = float(self._base[rod])
         second = math.pi * radius**4 / 4.0
         stiffness = 3.0 * self._modulus * second / length**3

@@ -1,7 +1,8 @@
 """Wind: every cane sways about its base. Wires hold it, so that its tip moves little more than its middle."""
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
+from typing import TypeVar
 
 import numpy as np
 
@@ -9,10 +10,17 @@ from bridge.sim.vineyard.row import Array, Rod, Row
 
 #: Height along a cane at which its amplitude is the one configured (m), and the frequencies (Hz).
 _AT, _FREQUENCIES = 0.3, (0.5, 2.0)
+Lengths = TypeVar("Lengths", float, Array)
+#: Shares of both ends, frequency and phase of what stands still.
+_STILL = (0.0, 0.0, 0.0, 0.0)
 
 
 class Wind:
-    """Moves the canes of a row. Rods keep their indices, and a place on a rod its fraction of the length."""
+    """Moves the canes of a row. Rods keep their indices, and a place on a rod its fraction of the length.
+
+    Attributes:
+        amplitude: 0.3 m above the base of a cane (m).
+    """
 
     def __init__(self, row: Row, amplitude: float, seed: int) -> None:
         """Draw direction, frequencies and phases.
@@ -23,6 +31,7 @@ class Wind:
             seed: Not negative.
         """
         azimuth = np.random.default_rng([seed, 0x317D]).uniform(0.0, math.tau)
+        self.amplitude = amplitude
         self._direction = amplitude * np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
         canes: dict[tuple[int, int, int], tuple[float, float]] = {}
         self._reach: dict[int, tuple[float, float, float, float]] = {}
@@ -45,7 +54,21 @@ class Wind:
             rod if rod is None or (near is not None and index not in near) else self._moved(index, rod, at)
             for index, rod in enumerate(row.rods)
         ]
-        return Row(tuple(rods), row.revision, row.backdrop)
+        return Row(tuple(rods), row.revision, row.backdrop, row.lying)
+
+    def shares(self, index: int) -> tuple[float, float]:
+        """How far both ends of a rod swing, as multiples of the amplitude; 0 for one that stands still."""
+        reach = self._reach.get(index)
+        return (0.0, 0.0) if reach is None else reach[:2]
+
+    def swings(self, indices: Sequence[int]) -> Array:
+        """Frequency (Hz) and phase (rad) of each rod (n×2)."""
+        return np.array([self._reach.get(index, _STILL)[2:] for index in indices]).reshape(-1, 2)
+
+    def pushes(self, swings: Array, at: float) -> Array:
+        """Displacement at a time (s) that each rod's share is of (n×3, m, world), from its frequency and phase."""
+        pushes: Array = np.sin(math.tau * swings[:, 0] * at + swings[:, 1])[:, None] * self._direction
+        return pushes
 
     def _moved(self, index: int, rod: Rod, at: float) -> Rod:
         reach = self._reach.get(index)
@@ -59,7 +82,7 @@ class Wind:
         return Rod(rod.kind, start, end, *radii, *numbers, rod.hanging, rod.organ)
 
 
-def bend(along: float) -> float:
-    """Share of the amplitude at a length along the cane: like a beam near its base, at most 2."""
-    ratio = (along / _AT) ** 2
+def bend(along: Lengths, at: float = _AT) -> Lengths:
+    """Share of a cane's displacement at a length along it: like a beam near its base, 1 at `at` (m), at most 2."""
+    ratio = (along / at) ** 2
     return 2.0 * ratio / (1.0 + ratio)

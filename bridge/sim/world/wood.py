@@ -1,4 +1,4 @@
-"""What becomes of a bite: blades that jam or leave a cane on its bark, and severed canes that hang in the wires."""
+"""What becomes of a bite: blades that jam or leave a cane on its bark, and severed canes that hang or lie."""
 
 import math
 
@@ -20,6 +20,8 @@ class Wood:
         """Bind the shares of failures and of hanging canes; `seed` is not negative."""
         self._failures, self._hanging = config.blade_failures, config.hanging
         self._rng = np.random.default_rng([seed, 0x3D00])
+        # A stream of its own, so that the fate of bites does not depend on it.
+        self._fallen = np.random.default_rng([seed, 0xFA11])
 
     def fails(self, diameter: float) -> bool:
         """Whether the blades fail at wood of a diameter (m): the force that it needs grows with its cross-section."""
@@ -37,3 +39,7 @@ class Wood:
         if drawn >= self._hanging:
             return None
         return np.array([aside * math.cos(azimuth), aside * math.sin(azimuth), -down])
+
+    def lies(self) -> float:
+        """Azimuth of a severed cane on the ground (rad, world)."""
+        return float(self._fallen.uniform(0.0, math.tau))
