@@ -2532,6 +2532,18 @@ def board_unseen(places: float) -> None:
     """The camera has looked from {places:.0f} places and has not seen the board."""
 
 
+@_reason(
+    "warning", "bring the arm to its survey posture (Home), put the board 45 cm before the camera, and calibrate again"
+)
+def board_not_ahead(cause: Reason) -> None:
+    """The calibration has not begun: {cause}."""
+
+
+@_reason("warning", "see that camera and perception work, and calibrate again")
+def board_without_picture(cause: Reason) -> None:
+    """The calibration has not begun, as the camera told nothing of the board: {cause}."""
+
+
 @_reason("info", "")
 def row_looked_at(seen: float, places: float) -> None:
     """The camera has looked at the row from {seen:.0f} of {places:.0f} places."""
@@ -2540,6 +2552,11 @@ def row_looked_at(seen: float, places: float) -> None:
 @_reason("info", "")
 def board_not_in_picture() -> None:
     """The board is not in this picture, or too little of it."""
+
+
+@_reason("info", "")
+def board_in_part(corners: float, needed: float) -> None:
+    """Too little of the board is in this picture: {corners:.0f} of its corners; it takes {needed:.0f}."""
 
 
 @_reason("info", "calibrate the camera first")
@@ -2700,6 +2717,21 @@ def frames_early(offset: float, interval: float) -> None:
 @_reason("warning", "calibrate it again")
 def calibration_old(days: float) -> None:
     """The camera was calibrated {days:.0f} days ago."""
+
+
+@_reason("warning", "calibrate it again")
+def base_calibration_old(days: float) -> None:
+    """The base was calibrated {days:.0f} days ago."""
+
+
+@_reason("warning", "calibrate it again")
+def arm_calibration_old(days: float) -> None:
+    """The arm was calibrated {days:.0f} days ago."""
+
+
+@_reason("warning", "check the camera, and use the new calibration of its clock, if there is one")
+def timing_calibration_old(days: float) -> None:
+    """The camera's clock was calibrated {days:.0f} days ago."""
 
 
 @_reason("warning", "")

@@ -63,7 +63,7 @@ def measure(seed: int, world: WorldConfig) -> tuple[Judged, Judged]:
         frame = survey_frame(camera, Row(()), model, number, arm=arm, offsets=errors.joint_offset)
         q = configuration(frame.base, frame.position)
         found = find_board(decode_frame(frame, model), frame.intrinsics, model.pose(q, model.flange_id), q)
-        views += [] if found is None else [found]
+        views += [found] if isinstance(found, BoardView) else []
     before, after = (_judged(seed, model, errors, views, arm) for arm in (None, RobotModel()))
     return before, after
 

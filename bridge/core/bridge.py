@@ -154,6 +154,7 @@ class BridgeCore:
         self._measured = self._calibration.measured(robot.read())
         self._odometer.follow(self._measured, 0.0)
         self._inertial_lost = False
+        self._calibrations_old: tuple[m.Reason, ...] = ()
         self._cut_id = ""
         self._outcome: m.Outcome = ""
         self._relaxed_limits = relaxed_limits
@@ -428,6 +429,7 @@ class BridgeCore:
         self._round_trip.forget(self._clock)
         moving = bool(np.any(self._limiter.sent))
         self._watch_mode(moving, now)
+        self._watch_calibrations()
         return m.BridgeState(
             header=m.Header(now),
             kind=self.kind,
@@ -451,7 +453,14 @@ class BridgeCore:
             base=self._calibration.base,
             arm=self._calibration.arm,
             timing=self._calibration.timing,
+            calibration_warnings=self._calibrations_old,
         )
+
+    def _watch_calibrations(self) -> None:
+        """Log each calibration once that is found to be old."""
+        before = {each.code for each in self._calibrations_old}
+        self._calibrations_old = self._calibration.warnings(self._wall)
+        self._events += [each for each in self._calibrations_old if each.code not in before]
 
     def _watch_mode(self, moving: bool, now: float) -> None:
         """Log that the robot moves although the newest mode of the token's holder allows no motion."""

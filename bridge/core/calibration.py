@@ -15,7 +15,7 @@ import numpy as np
 from bridge.core.interface import Measurement
 from rolling_panda import messages as m
 from rolling_panda import reasons
-from rolling_panda.calibration.file import FARTHEST_WHEELS, Calibrated, plausible
+from rolling_panda.calibration.file import DAY_S, FARTHEST_WHEELS, OLD_S, Calibrated, plausible
 from rolling_panda.model.differential_drive import Array, WheelSizes
 
 #: Keeps a calibration beyond a restart, on another thread; the future raises OSError where it cannot.
@@ -77,6 +77,16 @@ class Calibration:
     def joint_offsets(self) -> m.JointOffsets:
         """What is taken from the encoders of the joints (rad)."""
         return m.NO_OFFSETS if self.arm is None else self.arm.offsets
+
+    def warnings(self, wall_time: float) -> tuple[m.Reason, ...]:
+        """Which calibrations in use are old at a time of day (s since 1970), in whole days."""
+        used = (
+            (self.base, reasons.base_calibration_old),
+            (self.arm, reasons.arm_calibration_old),
+            (self.timing, reasons.timing_calibration_old),
+        )
+        ages = [(wall_time - each.made_at, old) for each, old in used if each is not None]
+        return tuple(old(age // DAY_S) for age, old in ages if age > OLD_S)
 
     def own_angles(self, arm: Array) -> Array:
         """Angles of the joints by their own encoders (7, rad), in which their limits hold, from those as drawn."""

@@ -1,7 +1,8 @@
 """Drives and turns of the base before the calibration's board, with a picture of it after each.
 
-The arm keeps its survey posture, so that the camera keeps its place on the base. The base stays within 0.3 m of where
-it stood, and turns by at most 30 degrees to either side.
+A first picture is taken where the robot stands; without the board in it nothing moves. The arm keeps its survey
+posture, so that the camera keeps its place on the base. The base stays within 0.3 m of where it stood, and turns by at
+most 30 degrees to either side.
 """
 
 import math
@@ -13,11 +14,11 @@ from controller.motion.follower import UNNAMED, Follower, Measured, Tracking
 from controller.whole_body.saturation import Saturation
 from controller.work.close_up import CloseUpClient
 from controller.work.homing import Homing, go_home
+from controller.work.picture_at_rest import PictureAtRest, not_begun
 from controller.work.step_result import StepResult
 from controller.work.survey import wheels
 from rolling_panda import reasons
 from rolling_panda.messages.perception import BASE
-from rolling_panda.messages.types import Reason
 from rolling_panda.model.differential_drive import NXI
 
 #: Places along the heading at the start (m), then headings against it (degrees), round by round. The board stays in the
@@ -34,8 +35,6 @@ _SPEED, _RATE, _BRAKING, _SLOWING = 0.12, 0.25, 0.15, 0.3
 _NEAR, _TURNED, _LEAST, _PATIENCE_S = 0.004, 0.005, 0.005, 3.0
 #: Back to the heading and to the line of a drive: (1/s), and (1/m²) times the speed squared.
 _GAIN_HEADING, _GAIN_ASIDE = 1.2, 6.0
-#: The base rests for this time before a picture (s), its wheels slower than this (rad/s).
-_REST_S, _STILL = 0.5, 1e-3
 
 
 class BaseViews:
@@ -58,12 +57,12 @@ class BaseViews:
             self._legs += [(True, place) for place in places]
             self._legs += [(False, math.radians(heading)) for heading in headings]
         self._all, self._number, self._seen = len(self._legs) + 1, 1, 0
+        self._picture = PictureAtRest(close_ups, f"{BASE}1")
+        self._begun = False
         self._homing: Homing | None = Homing(config, follower, 1.0 / config.rate_hz)
         self._start: tuple[float, float, float] | None = None
         self._leg: tuple[bool, float] | None = None
         self._moved: tuple[float, float] = math.inf, 0.0
-        self._rested_at: float | None = None
-        self._asked = ""
 
     def hold(self) -> None:
         """The robot stands for one period: nothing is held back."""
@@ -76,6 +75,8 @@ class BaseViews:
             robot: Measured robot.
             now: Monotonic time (s).
         """
+        if not self._begun:
+            return self._look_first(robot, now)
         if self._homing is not None:
             result = go_home(self._homing, robot, self._saturation, reasons.calibration_blocked)
             if self._homing.done:
@@ -117,27 +118,28 @@ class BaseViews:
             return StepResult(self._saturation.ramp(robot.sent), pause=why)
         return StepResult(tracking.xi)
 
-    def _look(self, robot: Measured, now: float) -> StepResult:
-        """Come to rest, take a picture, and begin the next leg."""
-        xi = self._saturation.ramp(robot.sent)
-        if self._rested_at is None or float(np.abs(robot.sent).max()) > _STILL:
-            self._rested_at = now
-        if now - self._rested_at < _REST_S:
-            return StepResult(xi)
-        if not self._asked:
-            self._asked = f"{BASE}{self._number}"
-            self._close_ups.ask(self._asked, "seen", now)
-        answer = self._close_ups.answer(self._asked, now)
+    def _look_first(self, robot: Measured, now: float) -> StepResult:
+        """Take a picture where the robot stands, which need not be in the survey posture."""
+        xi, answer = self._saturation.ramp(robot.sent), self._picture.step(robot, now)
         if answer is None:
             return StepResult(xi)
-        self._seen += answer.finding == "seen"
-        self._close_ups.forget(self._asked)
-        self._asked, self._rested_at = "", None
-        self._number += 1
-        if not self._legs:
-            return StepResult(xi, finished=True, summary=self._summary())
-        self._leg, self._moved = self._legs.pop(0), (math.inf, now)
+        if answer.finding != "seen":
+            return StepResult(xi, finished=True, summary=not_begun(answer))
+        # The round begins anew in the survey posture, since the camera has to keep its place on the base.
+        self._begun, self._picture = True, PictureAtRest(self._close_ups, f"{BASE}1")
         return StepResult(xi)
 
-    def _summary(self) -> Reason:
-        return reasons.board_seen(self._seen, self._all) if self._seen else reasons.board_unseen(self._all)
+    def _look(self, robot: Measured, now: float) -> StepResult:
+        """Come to rest, take a picture, and begin the next leg."""
+        xi, answer = self._saturation.ramp(robot.sent), self._picture.step(robot, now)
+        if answer is None:
+            return StepResult(xi)
+        if self._number == 1 and answer.finding != "seen":
+            return StepResult(xi, finished=True, summary=not_begun(answer))
+        self._seen += answer.finding == "seen"
+        if not self._legs:
+            return StepResult(xi, finished=True, summary=reasons.board_seen(self._seen, self._all))
+        self._number += 1
+        self._picture = PictureAtRest(self._close_ups, f"{BASE}{self._number}")
+        self._leg, self._moved = self._legs.pop(0), (math.inf, now)
+        return StepResult(xi)

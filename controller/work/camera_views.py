@@ -1,7 +1,8 @@
 """Postures from which the camera looks at the calibration's board, or at the row, and the work that takes the pictures.
 
 The base stands still. What is looked at stands about where it should be before the camera in the survey posture. Where
-exactly is not known, and need not be: each picture is used that shows it.
+exactly is not known, and need not be: each picture is used that shows it. For the board a first picture is taken where
+the robot stands; without the board in it nothing moves.
 """
 
 import math
@@ -17,6 +18,7 @@ from controller.motion.follower import UNNAMED, ArmMotion, Follower, Measured, M
 from controller.whole_body.saturation import Saturation
 from controller.work.close_up import CloseUpClient
 from controller.work.homing import Homing, go_home
+from controller.work.picture_at_rest import PictureAtRest, not_begun
 from controller.work.step_result import StepResult
 from rolling_panda import reasons
 from rolling_panda.messages.perception import ARM, CALIBRATION, CHECK
@@ -174,6 +176,9 @@ class CameraViews:
         self._number = 0
         self._asked = ""
         self._skipped: Reason | None = None
+        # The row is everywhere: where it is not in a picture the next one may show it.
+        self._first = None if prefix == CHECK else PictureAtRest(close_ups, f"{prefix}1")
+        self._looked_from_home = prefix == CHECK
 
     def hold(self) -> None:
         """The robot stands for one period."""
@@ -186,6 +191,8 @@ class CameraViews:
             robot: Measured robot.
             now: Monotonic time (s).
         """
+        if self._first is not None:
+            return self._look_first(robot, self._first, now)
         if self._homing is not None:
             return self._home(robot, self._homing)
         if self._asked:
@@ -204,12 +211,26 @@ class CameraViews:
         self._timeout.start(self._way.duration)
         return self._move(robot, self._way, now)
 
+    def _look_first(self, robot: Measured, picture: PictureAtRest, now: float) -> StepResult:
+        """A picture where the robot stands, and one more in the survey posture if it stood in another one."""
+        xi, answer = self._saturation.ramp(robot.sent), picture.step(robot, now)
+        if answer is None:
+            return StepResult(xi)
+        if answer.finding != "seen":
+            return StepResult(xi, finished=True, summary=not_begun(answer))
+        self._first = None
+        off = float(np.abs(robot.q[ARM_Q] - np.array(self._config.work.home)).max())
+        self._looked_from_home = self._homing is None or off < 2.0 * _NEAR
+        return StepResult(xi)
+
     def _home(self, robot: Measured, homing: Homing) -> StepResult:
         """To the survey posture, before the first picture and after the last."""
         result = go_home(homing, robot, self._saturation, reasons.calibration_blocked)
         if homing.done:
             self._homing = None
-            if not self._left:
+            if not self._looked_from_home:
+                self._first = PictureAtRest(self._close_ups, f"{self._prefix}1")
+            elif not self._left:
                 return StepResult(self._saturation.ramp(robot.sent), finished=True, summary=self._summary())
         return result
 

@@ -8,8 +8,10 @@ import numpy as np
 
 from perception.arrays import Array
 from perception.segmentation.frame import View
+from rolling_panda import reasons
 from rolling_panda.calibration.board import board, corners
 from rolling_panda.messages.robot import Intrinsics
+from rolling_panda.messages.types import Reason
 
 #: Least corners of a board that count: a part of a row of squares says little about its direction.
 _LEAST = 12
@@ -39,8 +41,8 @@ class BoardView:
         return self.q[:3]
 
 
-def find_board(view: View, reported: Intrinsics, T_odom_flange: Any, q: Array) -> BoardView | None:
-    """The board in a picture; None where too little of it is seen.
+def find_board(view: View, reported: Intrinsics, T_odom_flange: Any, q: Array) -> BoardView | Reason:
+    """The board in a picture, or why not: what is seen of it.
 
     Args:
         view: The picture.
@@ -55,8 +57,10 @@ def find_board(view: View, reported: Intrinsics, T_odom_flange: Any, q: Array) -
     settings = cv2.aruco.DetectorParameters()
     settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
     found, ids, _, _ = cv2.aruco.CharucoDetector(board(), cv2.aruco.CharucoParameters(), settings).detectBoard(grey)
-    if ids is None or len(ids) < _LEAST:
-        return None
+    if ids is None or len(ids) == 0:
+        return reasons.board_not_in_picture()
+    if len(ids) < _LEAST:
+        return reasons.board_in_part(len(ids), _LEAST)
     k = reported
     lens = np.array([[k.fx, 0.0, k.cx], [0.0, k.fy, k.cy], [0.0, 0.0, 1.0]])
     pixels = np.asarray(found, dtype=np.float64).reshape(-1, 2)

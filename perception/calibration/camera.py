@@ -17,7 +17,7 @@ from perception.calibration.monitor import MountError, MountMonitor
 from perception.segmentation.frame import View, decode_frame
 from rolling_panda import messages as m
 from rolling_panda import reasons
-from rolling_panda.calibration.file import FARTHEST_SHIFT, FARTHEST_TURN, OLD_S
+from rolling_panda.calibration.file import DAY_S, FARTHEST_SHIFT, FARTHEST_TURN, OLD_S
 from rolling_panda.messages.perception import CALIBRATION, CameraMount, CameraState, CloseUpResult
 from rolling_panda.messages.robot import LARGEST_DELAY, NO_OFFSETS, CameraFrame, FrameTiming, JointOffsets
 from rolling_panda.model.robot import RobotModel, configuration, mount_pose, pose_message, turn_and_shift
@@ -88,15 +88,15 @@ class CameraCalibration:
             self._views, self._offer, self._refused = {}, None, None
         q = configuration(frame.base, frame.position)
         found = find_board(view, frame.intrinsics, self._model.pose(q, self._model.flange_id), q)
-        if found is not None:
+        if isinstance(found, BoardView):
             self._views[frame.point_id] = found
             self._solve(frame.joint_offsets)
         return CloseUpResult(
             header=m.Header(frame.header.stamp, "odom"),
             point_id=frame.point_id,
             number=frame.number,
-            finding="unseen" if found is None else "seen",
-            reason=reasons.board_not_in_picture() if found is None else None,
+            finding="seen" if isinstance(found, BoardView) else "unseen",
+            reason=None if isinstance(found, BoardView) else found,
         )
 
     def follow(self, offsets: JointOffsets, delay: float = 0.0) -> bool:
@@ -184,7 +184,7 @@ class CameraCalibration:
         if self._mount is not None and not self.fits(self._mount.joint_offsets):
             return reasons.camera_of_other_arm()
         age_s = 0.0 if self._mount is None else self._clock() - self._mount.made_at
-        return reasons.calibration_old(age_s / 86400.0) if age_s > OLD_S else None
+        return reasons.calibration_old(age_s // DAY_S) if age_s > OLD_S else None
 
     def _use(self, mount: CameraMount | None) -> None:
         self._mount, self._offer = mount, None

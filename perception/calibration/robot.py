@@ -68,16 +68,18 @@ class RobotCalibrator:
             CorruptFrameError: The frame is corrupt; nothing changes.
         """
         view = decode_frame(frame, self._model)
-        seen = self._look_from_arm(frame, view) if frame.point_id.startswith(ARM) else self._look_from_base(frame, view)
+        from_arm = frame.point_id.startswith(ARM)
+        unseen = self._look_from_arm(frame, view) if from_arm else self._look_from_base(frame, view)
         return CloseUpResult(
             header=m.Header(frame.header.stamp, "odom"),
             point_id=frame.point_id,
             number=frame.number,
-            finding="seen" if seen else "unseen",
-            reason=None if seen else reasons.board_not_in_picture(),
+            finding="seen" if unseen is None else "unseen",
+            reason=unseen,
         )
 
-    def _look_from_base(self, frame: CameraFrame, view: View) -> bool:
+    def _look_from_base(self, frame: CameraFrame, view: View) -> m.Reason | None:
+        """Take in a picture; returns why the board is not seen, None if it is."""
         used = self._model.drive.sizes if frame.wheels is None else WheelSizes(*frame.wheels)
         at_origin = configuration(m.PlanarPose(0.0, 0.0, 0.0), frame.position)
         T_base_camera = self._model.pose(at_origin, self._model.camera_id)
@@ -85,7 +87,7 @@ class RobotCalibrator:
         # The frame has angles of wheels as drawn; those of the real ones follow from the sizes in use.
         drawn = self._model.drive.sizes.motion() @ np.array(frame.position[:2])
         wheels = np.linalg.solve(used.motion(), drawn)
-        seen = None if board is None else BaseView(board, T_base_camera, wheels, view.stamp)
+        seen = BaseView(board, T_base_camera, wheels, view.stamp) if isinstance(board, BoardView) else None
         views = self._base.add(frame.point_id, used, seen)
         found, refused = None, None
         try:
@@ -99,7 +101,7 @@ class RobotCalibrator:
             base=found,
             base_refused=refused,
         )
-        return seen is not None
+        return None if isinstance(board, BoardView) else board
 
     def _base_offer(self, fit: BaseFit) -> m.BaseCalibration:
         return m.BaseCalibration(
@@ -114,9 +116,11 @@ class RobotCalibrator:
             slip=fit.slip,
         )
 
-    def _look_from_arm(self, frame: CameraFrame, view: View) -> bool:
+    def _look_from_arm(self, frame: CameraFrame, view: View) -> m.Reason | None:
+        """Take in a picture; returns why the board is not seen, None if it is."""
         q = configuration(frame.base, frame.position)
-        seen = find_board(view, frame.intrinsics, self._model.pose(q, self._model.flange_id), q)
+        board = find_board(view, frame.intrinsics, self._model.pose(q, self._model.flange_id), q)
+        seen = board if isinstance(board, BoardView) else None
         views = self._arm.add(frame.point_id, frame.joint_offsets, seen)
         found, refused, self.mount = None, None, None
         try:
@@ -126,7 +130,7 @@ class RobotCalibrator:
         self.state = replace(
             self.state, header=m.Header(view.stamp, "camera"), arm_views=len(views), arm=found, arm_refused=refused
         )
-        return seen is not None
+        return None if isinstance(board, BoardView) else board
 
     def _arm_offer(self, views: tuple[BoardView, ...], used: JointOffsets) -> tuple[ArmCalibration, CameraMount]:
         """The joints' offsets, and the camera that belongs to them."""

@@ -18,8 +18,9 @@ from rolling_panda.runtime.state_folder import replace_durably
 FILE, BASE_FILE, ARM_FILE, TIMING_FILE = "camera.toml", "base.toml", "arm.toml", "timing.toml"
 #: A calibration that places the camera farther from the drawing than this (rad, m) is of another camera or bracket.
 FARTHEST_TURN, FARTHEST_SHIFT = 0.15, 0.05
-#: A calibration is old from this age on (s): work shakes brackets loose.
-OLD_S = 90 * 86400.0
+#: A day, and the age from which on a calibration is old (s): work shakes brackets loose, tyres wear, arms are hit.
+DAY_S = 86400.0
+OLD_S = 90 * DAY_S
 #: Largest difference of radii and track from those drawn, and of the radii from each other (shares).
 FARTHEST_WHEELS, FARTHEST_APART = 0.05, 0.02
 _HEAD = "# Where the camera is on the arm's flange. Without this file, perception takes it to be where it is drawn."

@@ -286,6 +286,7 @@ class BridgeState(Message, frozen=True, kw_only=True):
         base: Calibration of the wheels in use; None while they are taken to be as drawn.
         arm: Calibration of the joints' zeros in use; None while they are taken to be as drawn.
         timing: Calibration of the camera's clock in use; None while its delay is as configured.
+        calibration_warnings: Which of these calibrations are old.
     """
 
     header: Header
@@ -310,6 +311,7 @@ class BridgeState(Message, frozen=True, kw_only=True):
     base: BaseCalibration | None = None
     arm: ArmCalibration | None = None
     timing: FrameTiming | None = None
+    calibration_warnings: tuple[Reason, ...] = ()
 
 
 class ReleaseStop(Message, frozen=True, kw_only=True):

@@ -16,7 +16,8 @@ import pytest
 
 from bridge.sim.robot.trace import read
 from rolling_panda import messages as m
-from rolling_panda import topics
+from rolling_panda import reasons, topics
+from rolling_panda.calibration.file import save_robot
 from rolling_panda.config import TransportConfig
 from rolling_panda.model.robot import RobotModel
 from rolling_panda.reasons import said, text_of
@@ -162,6 +163,16 @@ def test_the_widest_deadline_that_can_be_set_still_stops_it_within_its_bound(tmp
     rows = read(tmp_path / "trace").rows
     assert np.abs(rows["setpoint"][:, :2]).max() == pytest.approx(fastest[0], rel=0.01)
     assert not rows[rows["clock"] > last + 0.25]["setpoint"].any(), "0.2 s, and 50 ms for a machine with other work"
+
+
+def test_an_old_calibration_that_is_read_at_the_start_is_told(tmp_path: Path) -> None:
+    (folder := tmp_path / "state").mkdir()
+    made_at = time.time() - 100.5 * 86400.0
+    save_robot(folder, "rp1", m.BaseCalibration(left=0.133, right=0.133, track=0.51, made_at=made_at))
+    save_robot(folder, "rp1", m.ArmCalibration(offsets=m.NO_OFFSETS, made_at=time.time()))
+    old = reasons.base_calibration_old(100.0)
+    with running_bridge(tmp_path) as bridge:
+        until(lambda: bridge.newest().calibration_warnings == (old,))
 
 
 @pytest.mark.parametrize(

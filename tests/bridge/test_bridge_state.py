@@ -9,6 +9,7 @@ import pytest
 from bridge.config import BridgeConfig, OdometryConfig
 from bridge.core.attitude import GRAVITY, BaseOrientation, Inertial
 from bridge.core.bridge import MOVING_CUT, TICK_S, BridgeCore, BridgeOutputs
+from bridge.core.calibration import Calibration
 from bridge.core.cut_orders import BUSY
 from bridge.core.interface import Measurement
 from bridge.core.odometer import Odometer
@@ -17,6 +18,7 @@ from bridge.core.state_memory import Remembered
 from bridge.core.validator import HELD, MOVING, OLD_SEQUENCE
 from rolling_panda import messages as m
 from rolling_panda import reasons
+from rolling_panda.calibration.file import Calibrated
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import RobotModel
@@ -62,6 +64,28 @@ def test_limits_that_are_less_strict_are_reported_at_the_start_and_in_every_stat
     assert lines(out)[0] == ("warning", text_of(reasons.limits_relaxed(RELAXED)))
     assert out.state is not None
     assert (out.state.relaxed_limits, out.state.kind) == ((RELAXED,), "fakes")
+
+
+def test_old_calibrations_are_reported_in_every_state_and_logged_once() -> None:
+    bench, made_at, day = Bench(), 1.7e9, 86400.0
+    base = m.BaseCalibration(left=0.133, right=0.133, track=0.51, made_at=made_at)
+    arm = m.ArmCalibration(offsets=m.NO_OFFSETS, made_at=made_at + day)
+    calibration = Calibration(MODEL.drive.sizes, float(MODEL.limits.velocity[0]), Calibrated(base, arm))
+    bench.core = BridgeCore(bench.robot, BridgeConfig(), MODEL.limits, odometer(), "sim", calibration=calibration)
+
+    def told(wall_time: float) -> tuple[set[tuple[m.Reason, ...]], list[m.Reason]]:
+        out = []
+        for _ in range(120):
+            bench.now += TICK_S
+            out.append(bench.core.step(bench.now, wall_time=wall_time))
+        states = {each.state.calibration_warnings for each in out if each.state is not None}
+        return states, [event.reason for each in out for event in each.events]
+
+    assert told(made_at + 90.0 * day) == ({()}, [])
+    old = reasons.base_calibration_old(90.0)
+    assert told(made_at + 90.5 * day) == ({(old,)}, [old])
+    older, arms = reasons.base_calibration_old(91.0), reasons.arm_calibration_old(90.0)
+    assert told(made_at + 91.5 * day) == ({(older, arms)}, [arms])
 
 
 def test_before_any_command_the_robot_is_held_and_told_to_rest(bench: Bench) -> None:

@@ -17,6 +17,7 @@ from bridge.sim.vineyard.row import Row
 from bridge.sim.world.config import CALM
 from bridge.sim.world.errors import draw_errors
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.calibration.file import Calibrated
 from rolling_panda.config import load_section
 from rolling_panda.messages.robot import NO_OFFSETS, ArmCalibration, BaseCalibration, FrameTiming, UseCalibration
@@ -132,6 +133,32 @@ def test_the_cameras_delay_is_used_once_it_is_kept_and_leaves_wheels_and_joints_
     assert told.code == "timing_calibration_used" and dict(told.values)["delay"] == pytest.approx(38.0)
     assert (calibration.base, calibration.arm, calibration.timing) == (WORN, ARM, timing)
     assert Calibration(DRAWN, FASTEST, Calibrated(timing=timing)).timing == timing, "of an earlier start"
+
+
+DAY_S = 86400.0
+TIMING = FrameTiming(delay=0.038, made_at=7.0)
+
+
+def test_calibrations_are_old_after_ninety_days_each_for_itself_and_a_new_one_is_not():
+    disk: Future[None] = Future()
+    disk.set_result(None)
+    calibration = Calibration(DRAWN, FASTEST, Calibrated(WORN, ARM, TIMING), keep=lambda each: disk)
+    assert calibration.warnings(7.0 + 90 * DAY_S) == ()
+    assert calibration.warnings(7.5 + 90 * DAY_S) == (reasons.timing_calibration_old(90.0),)
+    assert calibration.warnings(8.5 + 90 * DAY_S) == (
+        reasons.arm_calibration_old(90.0),
+        reasons.timing_calibration_old(90.0),
+    )
+    late = 9.0 + 100.9 * DAY_S
+    assert calibration.warnings(late) == (
+        reasons.base_calibration_old(100.0),
+        reasons.arm_calibration_old(100.0),
+        reasons.timing_calibration_old(100.0),
+    )
+    assert calibration.request(replace(ARM, made_at=late)) is None
+    assert calibration.kept(at_rest=True).code == "arm_calibration_used"
+    assert [each.code for each in calibration.warnings(late)] == ["base_calibration_old", "timing_calibration_old"]
+    assert Calibration(DRAWN, FASTEST).warnings(late) == (), "the drawing has no age"
 
 
 def true_wheels(errors):

@@ -18,14 +18,15 @@ from tests.support.controller_at_work import CONFIG, finish, robot, run_until
 OFFER = BaseCalibration(left=0.133, right=0.133, track=0.51, made_at=7.0)
 
 
-def calibrating(finding="seen", **changes):
-    """A robot that calibrates its base, whose pictures end like this."""
+def calibrating(finding="seen", arm=CONFIG.work.home, **changes):
+    """A robot that calibrates its base, whose pictures end like this, or as this tells of the pictures before."""
     r = robot(**changes)
+    r.q[ARM_Q] = arm
     pictures = []
 
     def close_up(request: CloseUpRequest):
         pictures.append((request.point_id, r.q.copy(), r.xi.copy()))
-        return replace(found(request), finding=finding)
+        return replace(found(request), finding=finding(pictures) if callable(finding) else finding)
 
     found, r.close_up = r.close_up, close_up
     r.step()
@@ -58,11 +59,31 @@ def test_it_drives_and_turns_takes_pictures_at_rest_and_ends_where_it_began():
     assert np.abs(r.q[:2]).max() < 0.01 and abs(r.q[2]) < 0.01 and not r.cuts
 
 
-def test_a_board_that_is_nowhere_is_told(monkeypatch):
+ASIDE = np.array(CONFIG.work.home) + [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.15]
+
+
+@pytest.mark.parametrize("arm", [CONFIG.work.home, ASIDE])
+def test_without_the_board_in_the_first_picture_nothing_moves(arm):
+    r, pictures = calibrating(finding="unseen", arm=arm)
+    finish(r, r.now + 5.0)
+    assert r.state.mode == "READY" and r.state.reason == reasons.board_not_ahead(reasons.board_not_in_picture())
+    assert {name for name, _, _ in pictures} == {f"{BASE}1"}
+    assert not np.any(r.record) and (r.q[ARM_Q] == arm).all() and not r.q[:3].any(), "nothing has moved"
+
+
+def test_where_the_board_is_seen_from_another_posture_but_not_from_the_survey_posture_the_base_stays():
+    r, pictures = calibrating(finding=lambda before: "seen" if len(before) == 1 else "unseen", arm=ASIDE)
+    finish(r, r.now + 30.0)
+    assert r.state.mode == "READY" and r.state.reason.code == "board_not_ahead"
+    assert np.abs(pictures[-1][1][ARM_Q] - CONFIG.work.home).max() < 0.02
+    assert {name for name, _, _ in pictures} == {f"{BASE}1"} and np.abs(r.q[:3]).max() < 1e-3
+
+
+def test_how_often_a_board_was_seen_that_leaves_the_picture_is_told(monkeypatch):
     monkeypatch.setattr(base_views, "ROUNDS", (((0.05, 0.0), (-5.0, 0.0)),))
-    r, _ = calibrating(finding="unseen")
+    r, _ = calibrating(finding=lambda before: "seen" if before[-1][0] == f"{BASE}1" else "unseen")
     finish(r, 600.0)
-    assert r.state.mode == "READY" and r.state.reason.code == "board_unseen"
+    assert r.state.mode == "READY" and r.state.reason == reasons.board_seen(1, 5)
 
 
 def test_a_base_that_something_holds_back_pauses_and_says_so():

@@ -1,10 +1,15 @@
 """The arm looks at the calibration's board from all around: the base stands still, each picture is taken at rest."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from controller.work import movement
+from controller.work.camera_views import BOARD
 from rolling_panda import commands as intents
+from rolling_panda import reasons
 from rolling_panda.messages.perception import ARM, CALIBRATION, CHECK, Capsule, CloseUpRequest
 from rolling_panda.model.robot import ARM_Q, RobotModel
 from tests.support.controller_at_work import CONFIG, finish, robot, run_until
@@ -12,14 +17,16 @@ from tests.support.controller_at_work import CONFIG, finish, robot, run_until
 MODEL = RobotModel()
 
 
-def calibrating(finding="seen", command=intents.CalibrateCamera, **changes):
-    """A robot that looks at the board, or at the row, whose pictures end like this."""
+def calibrating(finding="seen", command=intents.CalibrateCamera, arm=CONFIG.work.home, reason=None, **changes):
+    """A robot that looks at the board, or at the row, whose pictures end like this, or as this tells of the robot."""
     r = robot(**changes)
+    r.q[ARM_Q] = arm
     pictures = []
 
     def close_up(request: CloseUpRequest):
         pictures.append((request.point_id, r.q.copy(), r.xi.copy()))
-        return replace(found(request), finding=finding)
+        told = finding(r) if callable(finding) else finding
+        return None if told is None else replace(found(request), finding=told, reason=reason)
 
     found, r.close_up = r.close_up, close_up
     r.step()
@@ -72,11 +79,47 @@ def test_for_its_joints_the_arm_swings_its_elbow_too_and_looks_at_the_board_as_w
     assert np.abs(r.q[ARM_Q] - CONFIG.work.home).max() < 0.02 and not r.cuts
 
 
+ASIDE = np.array(CONFIG.work.home) + [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.15]
+
+
+@pytest.mark.parametrize("arm", [CONFIG.work.home, ASIDE])
+@pytest.mark.parametrize(("command", "name"), [(intents.CalibrateCamera, CALIBRATION), (intents.CalibrateArm, ARM)])
+def test_without_the_board_in_the_first_picture_nothing_moves_and_what_was_seen_is_told(command, name, arm):
+    cut_off = reasons.board_in_part(7, 12)
+    r, pictures = calibrating(finding="unseen", command=command, arm=arm, reason=cut_off)
+    finish(r, r.now + 5.0)
+    assert r.state.mode == "READY" and r.state.reason == reasons.board_not_ahead(cut_off)
+    assert {each for each, _, _ in pictures} == {f"{name}1"}
+    assert not np.any(r.record) and (r.q[ARM_Q] == arm).all(), "nothing has moved"
+
+
+def test_without_a_picture_nothing_moves_and_the_camera_is_named():
+    r, pictures = calibrating(finding=lambda _: None)
+    finish(r, r.now + CONFIG.work.close_up_timeout_s + 2.0)
+    assert r.state.mode == "READY" and r.state.reason.code == "board_without_picture"
+    assert dict(r.state.reason.values)["cause"].code == "no_close_up"
+    assert pictures and not np.any(r.record), "nothing has moved"
+
+
+def test_where_the_board_is_seen_from_another_posture_but_not_from_the_survey_posture_the_arm_stays_there():
+    r, pictures = calibrating(finding=lambda r: "seen" if r.q[ARM_Q][6] > ASIDE[6] - 0.01 else "unseen", arm=ASIDE)
+    finish(r, r.now + 30.0)
+    assert r.state.mode == "READY" and r.state.reason.code == "board_not_ahead"
+    names, places = taken_at_rest(pictures)
+    assert names == [f"{CALIBRATION}1"] and np.abs(places[-1] - CONFIG.work.home).max() < 0.02
+    assert np.abs(r.q[ARM_Q] - CONFIG.work.home).max() < 0.02
+
+
 @pytest.mark.long
-def test_a_board_that_is_nowhere_is_told():
-    r, _ = calibrating(finding="unseen")
-    finish(r, 300.0)
+def test_a_board_that_only_the_first_picture_shows_is_told(monkeypatch):
+    monkeypatch.setattr(movement, "BOARD", dataclasses.replace(BOARD, count=8))
+    at_home = []
+    r, pictures = calibrating(finding=lambda _: "unseen" if at_home else (at_home.append(1) or "seen"))
+    finish(r, 120.0)
     assert r.state.mode == "READY" and r.state.reason.code == "board_unseen"
+    names, _ = taken_at_rest(pictures)
+    assert dict(r.state.reason.values)["places"] == len(names) >= 4
+    assert np.abs(r.q[ARM_Q] - CONFIG.work.home).max() < 0.02
 
 
 def test_the_row_is_looked_at_from_a_few_places_with_the_image_upright():

@@ -109,6 +109,14 @@ STATES: dict[str, dict[str, Any]] = {
     "arm_stretched": {"controller": controller(manipulability=0.01)},
     "wire_plain": {"plain_wire": True},
     "limits_relaxed": {"relaxed_limits": RELAXED},
+    **{
+        old.code: {"bridge": bridge(calibration_warnings=(old,))}
+        for old in (
+            reasons.base_calibration_old(91.0),
+            reasons.arm_calibration_old(91.0),
+            reasons.timing_calibration_old(91.0),
+        )
+    },
     "cuts_unknown": {"points": (point(1, "UNKNOWN"),)},
 }
 

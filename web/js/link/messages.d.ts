@@ -371,6 +371,8 @@ export interface BridgeState {
   arm: ArmCalibration|null;
   /** Calibration of the camera's clock in use; None while its delay is as configured. */
   timing: FrameTiming|null;
+  /** Which of these calibrations are old. */
+  calibration_warnings: Reason[];
 }
 
 /** Bridge → all: measured actuated coordinates, like sensor_msgs/JointState. */

@@ -108,6 +108,7 @@ function ofDevices(state) {
     ...when(hardwareStopPressed(state), reason("emergency_stop_pressed")),
     ...when(bridge?.cutter === "jammed", reason("cutter_jammed")),
     ...(camera_warning ? [alarm(camera_warning, afterCamera(camera_warning, controller))] : []),
+    ...(bridge?.calibration_warnings ?? []).map((each) => alarm(each)),
     ...when(bridge?.watchdog && atWork && isLive("controller"), reason("commands_missing")),
   ];
 }
