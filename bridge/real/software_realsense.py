@@ -30,6 +30,8 @@ class SoftwareDevice:
             depth_unit: Metres a depth count.
         """
         self._lens, self._rate_hz, self._depth_unit = _intrinsics(lens), rate_hz, depth_unit
+        #: Clock of its times: the machine's (s since 1970), or `hardware_clock`, its own.
+        self.domain = rs.timestamp_domain.system_time
         # Sensors belong to their device.
         self._device = rs.software_device()
         depth, color = self._device.add_sensor("Depth"), self._device.add_sensor("Color")
@@ -48,7 +50,7 @@ class SoftwareDevice:
         self._number = 0
 
     def show(self, depth: NDArray[np.uint16], color: NDArray[np.uint8], at: float) -> None:
-        """One exposure, at `at` (s since 1970): depth counts (H×W) and colours (H×W×3)."""
+        """One exposure, at `at` (s, on the clock of `domain`): depth counts (H×W) and colours (H×W×3)."""
         self._number += 1
         images: tuple[NDArray[Any], NDArray[Any]] = (depth, color)
         for (sensor, profile), image in zip(self._sensors, images, strict=True):
@@ -57,7 +59,7 @@ class SoftwareDevice:
             frame.bpp = image.itemsize * (image.size // depth.size)
             frame.stride = depth.shape[1] * frame.bpp
             frame.timestamp, frame.frame_number = 1e3 * at, self._number
-            frame.domain = rs.timestamp_domain.system_time
+            frame.domain = self.domain
             frame.profile = profile.as_video_stream_profile()
             if image is depth:
                 frame.depth_units = self._depth_unit
