@@ -17,6 +17,7 @@ from bridge.core.robot_time import RealTime, SteppedTime
 from bridge.core.validator import HELD, OLD_EPOCH, OLD_SEQUENCE, TOO_OLD, UNKNOWN_EPOCH
 from bridge.sim.robot.robot import SimulatedRobot
 from bridge.sim.vineyard.row import Row
+from bridge.sim.world.config import CALM
 from rolling_panda import messages as m
 from rolling_panda.config import load_section
 from rolling_panda.messages.robot import CameraFrame
@@ -27,10 +28,25 @@ from rolling_panda.resources import resource
 from tests.support.bridge_rig import FORWARD, MODEL, REST, NoCamera, Parts, Rig, SimulatedPlant
 from tests.support.extras import need
 
+#: Pictures a second of a flawed robot that moves.
+FLAWED_HZ = 8.0
+#: By how much pictures are exposed later than their times tell (s), and the share of its turn that a base slides.
+LATE_S, SLIDES = 0.15, 0.2
+#: On an arc, with the arm turning too; and straight on, fast enough for a late picture to be elsewhere (60 mm).
+ARC = (*MODEL.drive.wheels(0.1, 0.5), 0.2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.1)
+FAST = (*MODEL.drive.wheels(0.4, 0.0), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
-def simulated() -> Parts:
+
+def simulated(flawed: bool = False, offset: float = 0.0) -> Parts:
+    """The simulated bridge; `flawed` as of `flawed_rig`, `offset` is the configured time offset of pictures (s)."""
     config = replace(load_section(resource("assets/config/sim.toml"), "bridge", BridgeConfig), inertial=True)
-    plant = SimulatedPlant(SimulatedRobot(config, Row(()), NoCamera()))
+    world = CALM
+    if flawed:
+        # Of this seed the wheels are smaller than drawn, and farther apart.
+        config = replace(config, camera_moving_hz=FLAWED_HZ, frame_time_offset=offset)
+        world = replace(CALM, frame_delay=LATE_S, wheel_error=0.1)
+    camera = NoCamera()
+    plant = SimulatedPlant(SimulatedRobot(config, Row(()), camera, world=world, seed=1), camera)
 
     def start() -> BridgeCore:
         odometer = Odometer(MODEL.drive, config.odometry, TICK_S, 0, BaseOrientation(RobotModel()))
@@ -39,20 +55,45 @@ def simulated() -> Parts:
     return Parts(start, plant, lambda: SteppedTime(0.0, TICK_S), real=False, close=plant.robot.close)
 
 
-def real() -> Parts:
+def real(flawed: bool = False, offset: float = 0.0) -> Parts:
+    """The same with the real one."""
     need("real")
-    from tests.support.real_rig import RealPlant
+    from tests.support.real_rig import CONFIG, RealPlant
 
-    plant = RealPlant()
+    if flawed:
+        plant = RealPlant(replace(CONFIG, camera_moving_hz=FLAWED_HZ, frame_time_offset=offset), LATE_S, SLIDES)
+    else:
+        plant = RealPlant()
     return Parts(plant.start, plant, lambda: RealTime(time.monotonic(), TICK_S), real=True, close=plant.close)
 
 
-@pytest.fixture(params=[simulated, pytest.param(real, marks=pytest.mark.paced)])
+EACH = [simulated, pytest.param(real, marks=pytest.mark.paced)]
+
+
+@pytest.fixture(params=EACH)
 def rig(request: pytest.FixtureRequest) -> Iterator[Rig]:
     factory: Callable[[], Parts] = request.param
     rig = Rig(factory())
     yield rig
     rig.close()
+
+
+@pytest.fixture(params=EACH)
+def flawed_rig(request: pytest.FixtureRequest) -> Iterator[Callable[[float], Rig]]:
+    """A robot whose pictures are late by `LATE_S`, and whose base turns by less than its wheels tell.
+
+    It takes the configured time offset of pictures (s).
+    """
+    factory: Callable[[bool, float], Parts] = request.param
+    rigs: list[Rig] = []
+
+    def start(offset: float) -> Rig:
+        rigs.append(Rig(factory(True, offset)))
+        return rigs[-1]
+
+    yield start
+    for rig in rigs:
+        rig.close()
 
 
 def stop(stop_id: str = "s1") -> m.StopRequest:
@@ -102,6 +143,120 @@ def test_how_the_base_stands_is_told_with_the_odometry_and_each_picture(rig: Rig
     for attitude in told:
         assert attitude is not None
         assert (attitude.height, attitude.roll, attitude.pitch) == pytest.approx((0.0, 0.0, 0.0), abs=2e-3)
+
+
+@pytest.mark.long
+def test_the_heading_is_that_of_the_gyroscope_where_the_base_turns_otherwise_than_its_wheels(
+    flawed_rig: Callable[[float], Rig],
+) -> None:
+    rig = flawed_rig(0.0)
+    # At rest the gyroscope's bias becomes known.
+    rig.run(1.0, REST)
+    assert rig.until(lambda: measured(rig), REST, 15.0)
+
+    def driven() -> bool:
+        return rig.plant.heading() > 1.2
+
+    assert rig.until(driven, ARC, 15.0)
+    rig.run(0.3, REST)
+    assert rig.until(rig.at_rest, REST)
+    rig.run(1.0, REST)
+    turned = rig.plant.heading()
+    joints = [out.joints.position[:2] for out in rig.outputs if out.joints]
+    by_wheels = MODEL.drive.twist(*(np.array(joints[-1]) - joints[0]).tolist())[1]
+    other = by_wheels - turned
+    assert other > 0.07
+    # While a machine that is held up reads no sample, the base turns as its wheels say.
+    odometry = next(out.odometry for out in reversed(rig.outputs) if out.odometry)
+    assert abs(odometry.pose.phi - turned) < 0.25 * other and measured(rig)
+    told = len(pictures(rig))
+    assert rig.until(lambda: len(pictures(rig)) > told + 1, REST)
+    assert abs(pictures(rig)[-1].base.phi - turned) < 0.25 * other
+
+
+def measured(rig: Rig) -> bool:
+    """Whether the newest odometry tells that the gyroscope turns it."""
+    odometry = next(out.odometry for out in reversed(rig.outputs) if out.odometry)
+    return odometry.attitude is not None and odometry.attitude.measured
+
+
+def pictures(rig: Rig) -> list[CameraFrame]:
+    return [out.frame for out in rig.outputs if out.frame]
+
+
+def place(rig: Rig, at: float) -> Array:
+    """Where the odometry has the base (x, y in m) at a time (s)."""
+    told = [out.odometry for out in rig.outputs if out.odometry]
+    stamps = [each.header.stamp for each in told]
+    assert stamps[0] <= at <= stamps[-1]
+    return np.array([np.interp(at, stamps, [getattr(each.pose, axis) for each in told]) for axis in ("x", "y")])
+
+
+def late_pictures(rig: Rig) -> tuple[float, float]:
+    """Drive, and see what the next pictures tell: medians over them.
+
+    Each tells the place that the odometry has for its own time. A machine that is held up takes steps that it has
+    missed later or not at all, and a picture between them tells a time beside its own.
+
+    Returns:
+        By how much later they were exposed than they tell (s), and how far from where they tell (m).
+    """
+    begun = len(pictures(rig))
+    assert rig.until(lambda: not rig.at_rest(), FAST)
+    assert rig.until(lambda: len(pictures(rig)) >= begun + 9, FAST, 15.0)
+    # Odometry is told later than it is true.
+    rig.run(0.3, REST)
+    assert rig.until(rig.at_rest, REST)
+    late, off = [], []
+    for frame in pictures(rig)[begun + 2 :]:
+        told, true = frame.header.stamp, rig.plant.exposed_at(frame)
+        base = np.array([frame.base.x, frame.base.y])
+        assert base == pytest.approx(place(rig, told), abs=0.01)
+        late.append(true - told)
+        off.append(float(np.linalg.norm(place(rig, true) - base)))
+    return float(np.median(late)), float(np.median(off))
+
+
+def near(rig: Rig) -> tuple[float, float]:
+    """How near to their exposure pictures tell their time (s) and place (m); a real bridge is late where it is busy."""
+    return (0.04, 0.02) if rig.parts.real else (0.006, 0.004)
+
+
+@pytest.mark.long
+def test_a_picture_tells_when_it_was_exposed_and_where_the_base_was_then(rig: Rig) -> None:
+    rig.run(0.3, REST)
+    late, off = late_pictures(rig)
+    time_s, way = near(rig)
+    assert abs(late) < time_s and off < way
+
+
+@pytest.mark.long
+def test_a_late_picture_tells_when_it_was_exposed_once_the_delay_is_calibrated(
+    flawed_rig: Callable[[float], Rig],
+) -> None:
+    rig = flawed_rig(0.0)
+    rig.run(0.3, REST)
+    late, off = late_pictures(rig)
+    time_s, way = near(rig)
+    assert late == pytest.approx(LATE_S, abs=time_s), "as the camera's clock has it"
+    assert off > 2.0 * way
+    new = m.FrameTiming(delay=LATE_S, made_at=5.0)
+    assert rig.core.on_calibration(m.UseCalibration(user="ada", timing=new)).ok
+    assert rig.until(lambda: rig.state.timing == new, REST)
+    late, off = late_pictures(rig)
+    assert abs(late) < time_s and off < way
+
+
+@pytest.mark.long
+def test_a_late_picture_tells_when_it_was_exposed_where_the_offset_is_configured(
+    flawed_rig: Callable[[float], Rig],
+) -> None:
+    rig = flawed_rig(LATE_S)
+    rig.run(0.3, REST)
+    late, off = late_pictures(rig)
+    assert {frame.delay for frame in pictures(rig)} == {LATE_S}
+    time_s, way = near(rig)
+    assert abs(late) < time_s and off < way
 
 
 def test_calibrated_wheels_turn_as_the_ground_needs_and_the_odometry_tells_the_way(rig: Rig) -> None:

@@ -1,6 +1,7 @@
 """A bridge of any kind with this test in the controller's place, and its plant to be judged by."""
 
 import time
+import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Protocol
@@ -9,11 +10,11 @@ import numpy as np
 
 from bridge.core.bridge import BridgeCore, BridgeOutputs
 from bridge.core.interface import Measurement, Setpoint
-from bridge.core.picture import Picture
+from bridge.core.picture import DEPTH_UNIT, Picture, encode_picture
 from bridge.core.robot_time import RobotTime
 from bridge.sim.robot.robot import SimulatedRobot
 from rolling_panda import messages as m
-from rolling_panda.messages.robot import Intrinsics
+from rolling_panda.messages.robot import CameraFrame, Intrinsics
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import RobotModel
 
@@ -22,7 +23,10 @@ REST = (0.0,) * 9
 FORWARD = (*MODEL.drive.wheels(0.2, 0.0), 0.2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.1)
 #: A step of a real bridge, or an answer of a device, that takes longer was held up by the machine (s).
 _IN_TIME_S = 0.02
-PICTURE = Picture(Intrinsics(4, 4, 1.0, 1.0, 2.0, 2.0), b"c", b"d", b"")
+LENS = Intrinsics(4, 4, 1.0, 1.0, 2.0, 2.0)
+PICTURE = Picture(LENS, b"c", b"d", b"")
+#: Number of an exposure as the distance of a wall (m).
+NUMBER_M = 0.001
 
 
 class Plant(Protocol):
@@ -35,6 +39,10 @@ class Plant(Protocol):
     def bites(self) -> int: ...  # how often the blades have met
 
     def push(self, torques: tuple[float, ...]) -> None: ...  # external torques of the arm's joints (7, N·m) from now on
+
+    def heading(self) -> float: ...  # by how much the base has turned since the start (rad, not wrapped)
+
+    def exposed_at(self, frame: CameraFrame) -> float: ...  # when its picture was really exposed (s, the robot's time)
 
 
 @dataclass(frozen=True)
@@ -182,14 +190,24 @@ class Rig(Commander):
         self.parts.close()
 
 
+def number_of(frame: CameraFrame) -> int:
+    """Which exposure a picture shows: they are numbered by the distance of a wall."""
+    counts = np.frombuffer(zlib.decompress(frame.depth_zlib), "<u2")
+    return round(float(np.median(counts)) * DEPTH_UNIT / NUMBER_M)
+
+
 class NoCamera:
-    """A photographer whose pictures nobody looks at."""
+    """A photographer whose pictures show their number and nothing else."""
 
     def __init__(self) -> None:
         self._ready: Picture | None = None
+        #: When each was exposed (s), number 1 first.
+        self.exposures: list[float] = []
 
     def expose(self, row: object, T_world_camera: Array, at: float, velocity: Array) -> bool:
-        self._ready = PICTURE
+        self.exposures.append(at)
+        wall = np.full((LENS.height, LENS.width), len(self.exposures) * NUMBER_M, np.float32)
+        self._ready = encode_picture(LENS, np.zeros((*wall.shape, 3), np.uint8), wall, None)
         return True
 
     def ready(self) -> Picture | None:
@@ -203,8 +221,9 @@ class NoCamera:
 class SimulatedPlant:
     """Stands between core and simulated robot: notes what goes to the servos, and what the physics make of it."""
 
-    def __init__(self, robot: SimulatedRobot) -> None:
+    def __init__(self, robot: SimulatedRobot, camera: NoCamera | None = None) -> None:
         self.robot = robot
+        self._exposures = [] if camera is None else camera.exposures
         self._last = np.zeros(9)
         self._bites = 0
         self._breaches: list[str] = []
@@ -247,3 +266,9 @@ class SimulatedPlant:
 
     def bites(self) -> int:
         return self._bites
+
+    def heading(self) -> float:
+        return float(self.robot.true_base().pose[2])
+
+    def exposed_at(self, frame: CameraFrame) -> float:
+        return self._exposures[number_of(frame) - 1]
