@@ -35,6 +35,10 @@ def draw_vine(folder: Path, figure: Figure) -> None:
     if not paths:
         raise FileNotFoundError(folder / "vine.json")
     groups: dict[str, list[dict[str, float]]] = {}
+    for path in paths:
+        document = json.loads(path.read_text(encoding="utf-8"))
+        if not isinstance(document, dict) or not document.get("results") or "stages_s" not in document:
+            raise InputError(f"{path} has no vines of `bench vine --json`; run it again")
         for run in document["results"]:
             cultivar = run.get("cultivar", USUAL)
             name = condition(run["training"], cultivar, run["preset"], run["review"], run["decision_s"])
