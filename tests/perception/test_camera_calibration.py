@@ -1,5 +1,6 @@
 """The next calibration of the camera: pictures of the board in, an offer out. What is refused changes nothing."""
 
+import cv2
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -90,6 +91,21 @@ def test_without_a_board_nothing_is_seen_and_the_old_calibration_stays():
     assert camera.state.views == 0 and camera.state.offer is None
     refused = camera.use(1.8e9)
     assert not refused.ok and refused.reason.code == "no_calibration_offered"
+
+
+def test_how_much_of_the_board_is_seen_is_told_while_it_comes_into_the_picture():
+    frame = photographed(CALM, board=True, count=1)[0]
+    whole = cv2.imdecode(np.frombuffer(frame.color_jpeg, np.uint8), cv2.IMREAD_COLOR)
+    told = []
+    for shown in range(0, whole.shape[1], 16):
+        part = whole.copy()
+        part[:, shown:] = 128
+        result = calibration().look(replace(frame, color_jpeg=cv2.imencode(".jpg", part)[1].tobytes()))
+        told.append("seen" if result.reason is None else result.reason.code)
+        if result.reason is not None and result.reason.code == "board_in_part":
+            corners = dict(result.reason.values)["corners"]
+            assert 0 < corners < dict(result.reason.values)["needed"] == 12
+    assert list(dict.fromkeys(told)) == ["board_not_in_picture", "board_in_part", "seen"]
 
 
 @pytest.mark.long
