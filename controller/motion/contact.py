@@ -120,7 +120,14 @@ class ContactMonitor:
     @property
     def beyond(self) -> bool:
         """Whether a limit is passed now."""
-        return self._passes(self._config.stop_force, self._limits)
+        return self.load >= 1.0
+
+    @property
+    def load(self) -> float:
+        """What is felt as a share of the limits of a contact, of which the first is at 1; 0 without an estimate."""
+        if self.force is None:
+            return 0.0
+        return max(self.force / self._config.stop_force, float((np.abs(self.torque) / self._limits).max()))
 
     def _passes(self, force: float, torques: Array) -> bool:
         """Whether the force at the tool (N) or the torque of a joint (7, N·m) is beyond these limits now."""

@@ -1,5 +1,6 @@
 """The way back after a contact: the robot retraces its own last motion, base and arm alike."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -15,8 +16,9 @@ Trail = Sequence[tuple[Array, Array]]
 _SLOWER, _SHORTEST_S = 2.0, 1.0
 #: Its progress begins and ends gently: a third of the time it speeds up, and a third it slows down.
 _GENTLE = quickest(1.0, Rates(1.5, 6.75, 60.0))
-#: Within this time the contact has to end (s).
-_FREE_S = 0.6
+#: After this time (s) a contact beyond its limits has to ease, as the way back begins slowly: within each further time
+#: (s) it has to be less than ever before by a share.
+_FREE_S, _EASES_S, _EASES = 0.6, 0.25, 0.02
 #: A motion that has not ended this long after its planned end is given up (s).
 _LATE_S = 1.0
 
@@ -42,11 +44,19 @@ class BackOff:
         self._way = np.array(way)
         self._duration = max(_SLOWER * dt * len(way), _SHORTEST_S)
         self._time = self._passed = 0.0
+        #: Least load so far, and when that was (s).
+        self._least, self._eased = math.inf, 0.0
         #: Whether it has ended, and whether it arrived.
         self.done, self.arrived = len(way) < 2, False
 
-    def step(self, robot: Measured, follower: Follower, beyond: bool) -> Tracking:
-        """One period; with `beyond` a limit of the contact is passed, which ends this way back once it has begun."""
+    def step(self, robot: Measured, follower: Follower, load: float) -> Tracking:
+        """One period; a contact beyond its limits that does not ease ends this way back once it has begun.
+
+        Args:
+            robot: Measured robot.
+            follower: Of the motion.
+            load: Of the contact, 1 at its limits.
+        """
         progress = _GENTLE.over(self._time, self._duration)
         last = len(self._way) - 1
         at = progress.s * last
@@ -57,7 +67,9 @@ class BackOff:
         self._time += self._dt * tracking.scale
         self._passed += self._dt
         self.arrived = self._time >= self._duration
+        if load < (1.0 - _EASES) * self._least:
+            self._least, self._eased = load, self._passed
         # Something else is in the way back, or the robot is caught.
-        again = self._passed > _FREE_S and beyond
-        self.done = self.arrived or again or self._passed > self._duration + _LATE_S
+        caught = load >= 1.0 and self._passed > max(_FREE_S, self._eased + _EASES_S)
+        self.done = self.arrived or caught or self._passed > self._duration + _LATE_S
         return tracking

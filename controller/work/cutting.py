@@ -577,7 +577,7 @@ class GivingWay(Stage):
             return self, parts.brake(robot)
         if not self._back.done:
             # A hard push is a contact, which ends the work.
-            tracking = self._back.step(robot, parts.follower, beyond=False)
+            tracking = self._back.step(robot, parts.follower, load=0.0)
             return self, StepResult(tracking.xi, tracking)
         free = self._back.arrived and (self._contact.force or 0.0) < config.contact.stop_force
         self._contact.gave_way(free)

@@ -269,7 +269,7 @@ class Movement:
             self._event_log.log(reasons.backed_off() if self._back_off.arrived else reasons.not_backed_off())
             self._backs_off = False
             return self.ramp()
-        self.tracking = self._back_off.step(robot, self.body.follower, self.body.contact.beyond)
+        self.tracking = self._back_off.step(robot, self.body.follower, self.body.contact.load)
         return MotionResult(self.tracking.xi)
 
     def _bring_home(self, robot: Measured) -> MotionResult:

@@ -327,6 +327,22 @@ def test_what_still_pushes_ends_the_way_back_and_after_a_look_the_robot_can_be_l
     assert r.state.mode == "TELEOP", r.state.reason
 
 
+@pytest.mark.parametrize("ends", [0, 25])
+def test_a_contact_that_eases_is_gone_back_from_and_one_that_no_longer_does_ends_the_way_back(ends):
+    r = led()
+    r.external_torque = (60.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    r.run(0.4)
+    assert r.state.mode == "PROTECTIVE_STOP"
+    # After a second of the way back it is still beyond the limit of 10 N·m.
+    for left in range(50, ends, -1):
+        r.external_torque = (float(left), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        r.run(0.03)
+    r.run(1.0)
+    told = "has gone back a little" if ends == 0 else "could not go back"
+    assert [told in line for line in r.events if "After the contact" in line] == [True], r.events
+    assert not np.any(r.xi.round(3))
+
+
 def test_a_stop_during_the_way_back_ends_it():
     r = led()
     r.external_torque = (20.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
