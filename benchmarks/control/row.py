@@ -26,6 +26,7 @@ from benchmarks.control.row_report import Cut, RowRun, mean_stages, summarise, t
 from benchmarks.control.row_stages import StageClock
 from benchmarks.control.row_supervisor import Supervisor
 from benchmarks.control.row_walk import walk
+from benchmarks.control.stops import stops_of
 from benchmarks.peers.reactive import in_rows
 from benchmarks.perception.blocked import Blocker, blocked_by
 from bridge.sim.robot import trace
@@ -142,8 +143,9 @@ def cut_row(
                 other_s, auto_s = person.waited_s, loop.now - begin - person.waited_s - _AFTER_S
                 work_s = sum(durations.values()) if durations else auto_s
             ends = {entry.point_id: entry for entry in loop.queue()}
-            stops = sum(stopped(event.reason) for event in loop.events)
+            events = tuple(loop.events)
         record = trace.read(path)
+    stops = stops_of(events, record.rows)
     cuts = judged_cuts(method, seed, accepted, ends, wanted, record.events, durations)
     return RowRun(
         method=method,
@@ -154,7 +156,8 @@ def cut_row(
         path_rms=math.sqrt(float(np.mean(np.square(errors)))) if errors else 0.0,
         contacts=int(np.count_nonzero(record.rows["contacts"])),
         self_contacts=int(np.count_nonzero(record.rows["self_contacts"])),
-        stops=stops,
+        stops=len(stops),
+        false_stops=sum(stop.false for stop in stops),
         cleared=person.cleared,
         auto_s=auto_s,
         stages=clock.stages,
@@ -242,11 +245,6 @@ def _blocked(
         if cut is not None and away < _OF_POINT:
             found[entry.point_id] = blocked_by(row, cut)
     return found
-
-
-def stopped(reason: m.Reason) -> bool:
-    """Whether a line of the log tells of a protective stop."""
-    return reason.code == "robot_halted" and dict(reason.values)["after"] == "PROTECTIVE_STOP"
 
 
 def codes(reason: m.Reason | None) -> str:

@@ -90,6 +90,7 @@ class RowRun:
         camera_warning: What a check of the camera has told; empty without a check, or where nothing is wrong.
         cleared: Stops and pauses after which a played person let the work go on.
         auto_s: In automatic work, whether a point ended or not (s, simulated).
+        false_stops: Protective stops at which the robot touched nothing, by the truth.
     """
 
     method: str
@@ -108,6 +109,7 @@ class RowRun:
     camera_warning: str = ""
     cleared: int = 0
     auto_s: float = 0.0
+    false_stops: int = 0
 
 
 def tell(run: RowRun, speed: float) -> None:
@@ -182,5 +184,6 @@ def summarise(runs: list[RowRun]) -> dict[str, float | int]:
         "canes_touched": sum(len(run.canes_touched) for run in runs),
         "staying_touched": sum(len(run.staying_touched) for run in runs),
         "stops": sum(run.stops for run in runs),
+        "false_stops": sum(run.false_stops for run in runs),
         "stops_cleared": sum(run.cleared for run in runs),
     }

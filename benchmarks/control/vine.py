@@ -27,6 +27,7 @@ from benchmarks.control.row_report import Cut
 from benchmarks.control.row_stages import STAGES, StageClock
 from benchmarks.control.row_supervisor import GONE_S, LOOK_S
 from benchmarks.control.row_walk import USER, go_on, place
+from benchmarks.control.stops import stops_of
 from benchmarks.control.world import calibrated
 from benchmarks.perception.blocked import Blocker, blocked_by
 from benchmarks.perception.judge import nearest_rod
@@ -138,6 +139,7 @@ class VineRun:
         glances: Such looks.
         stops: Protective stops after which a person let the work go on.
         cultivar: How the vine grows: a preset of the vineyard.
+        false_stops: Protective stops at which the robot touched nothing, by the truth.
     """
 
     seed: int
@@ -160,6 +162,7 @@ class VineRun:
     glances: int = 0
     stops: int = 0
     cultivar: str = USUAL
+    false_stops: int = 0
 
     @property
     def key(self) -> tuple[object, ...]:
@@ -514,6 +517,7 @@ def prune_vine(
             ended = visit.make()
             ends = {entry.point_id: entry for entry in loop.queue()}
             shown = loop.inbox.newest(m.PruningPoints)
+            events = tuple(loop.events)
             sites = *(() if shown is None else shown.message.undecided_sites), *visit.reviewer.left
         record = trace.read(path)
     reviewer = visit.reviewer
@@ -539,6 +543,7 @@ def prune_vine(
         glances=reviewer.glances,
         stops=visit.stops,
         cultivar=cultivar,
+        false_stops=sum(stop.false for stop in stops_of(events, record.rows)),
     )
 
 
@@ -666,6 +671,7 @@ def tell(run: VineRun) -> None:
         f"person {run.person_s:.0f} s in {run.decisions} decisions, {run.glances} glances; {outcomes}; "
         f"{harmed} harmed, {run.contacts}+{run.self_contacts} contacts, {run.wall_s:.0f} s of real time"
         + (f"; {run.stops} protective stops" if run.stops else "")
+        + (f"; {run.false_stops} false stops" if run.false_stops else "")
         + (f"; not left: {run.ended}" if run.ended else ""),
         flush=True,
     )

@@ -135,25 +135,33 @@ class Work:
     Attributes:
         minutes: Of automatic work (simulated).
         stops: Protective stops.
+        false_stops: Those at which the robot touched nothing, by the truth.
         stops_cleared: Stops and pauses after which a played person let the work go on.
     """
 
     minutes: float
     stops: int
     stops_cleared: int
+    false_stops: int = 0
 
 
 def work_of(runs: Sequence[RowRun]) -> Work:
     """How long the rows were worked on, and what stopped it."""
     minutes = sum(run.auto_s for run in runs) / 60.0
-    return Work(minutes, sum(run.stops for run in runs), sum(run.cleared for run in runs))
+    return Work(
+        minutes,
+        sum(run.stops for run in runs),
+        sum(run.cleared for run in runs),
+        sum(run.false_stops for run in runs),
+    )
 
 
 def told_stops(work: Work) -> str:
     """Stops and their rate as text."""
     each = f", one in {work.minutes / work.stops:.1f} min" if work.stops else ""
     return (
-        f"protective stops {work.stops} in {work.minutes:.1f} min of work{each}; "
+        f"protective stops {work.stops} in {work.minutes:.1f} min of work{each}, "
+        f"{work.false_stops} of them with nothing touched; "
         f"stops and pauses a person cleared {work.stops_cleared}"
     )
 
@@ -220,7 +228,7 @@ def main(argv: Sequence[str]) -> int:
             right, harmed = sum(cut.true_right for cut in run.cuts), sum(bool(cut.harm) for cut in run.cuts)
             print(
                 f"{case.name}, {case.level}, seed {seed}: {right} of {len(run.cuts)} right, {harmed} harmed, "
-                f"{run.contacts} contacts, {run.stops} stops, {run.cleared} cleared, "
+                f"{run.contacts} contacts, {run.stops} stops ({run.false_stops} false), {run.cleared} cleared, "
                 f"{time.perf_counter() - begin:.0f} s",
                 flush=True,
             )

@@ -1,5 +1,6 @@
 import math
 from pathlib import Path
+from typing import Literal
 
 import msgspec
 import numpy as np
@@ -12,7 +13,7 @@ from bridge.core.odometer import Odometer
 from bridge.sim.robot.robot import SimulatedRobot, VelocityServos
 from bridge.sim.robot.trace import TraceWriter, read
 from bridge.sim.vineyard.row import Rod, Row
-from bridge.sim.world.config import PRESETS
+from bridge.sim.world.config import PRESETS, only
 from rolling_panda.config import load_section
 from rolling_panda.model.base_attitude import attitude_of
 from rolling_panda.model.robot import RobotModel
@@ -129,6 +130,24 @@ def test_a_wire_is_met_by_the_arm() -> None:
         sim.write(setpoint(arm=(0.0, 0.4, 0.0, 0.0, 0.0, 0.0, 0.0)))
         touched += sim.contacts
     assert touched > 0
+
+
+@pytest.mark.parametrize(("kind", "contacts"), [("wire", True), ("cane", False)])
+def test_the_trace_has_the_force_of_a_touch_also_of_a_cane_that_bends(
+    tmp_path: Path, kind: Literal["wire", "cane"], contacts: bool
+) -> None:
+    # A cane gives way to what is in it from the beginning.
+    height, ahead = robot().true_tool()[2, 3] - 0.1, robot().true_tool()[1, 3] + (0.05 if kind == "cane" else -0.1)
+    ends = np.array([-0.4, ahead, height]), np.array([0.4, ahead, height])
+    rod = Rod(kind, *ends, 0.004, 0.004, vine=1, spur=2, cane=0) if kind == "cane" else Rod(kind, *ends, 0.004, 0.004)
+    trace, world = TraceWriter(tmp_path / "t"), only(("cane_modulus",), "field")
+    sim = SimulatedRobot(CONFIG, Row((rod,)), Blind(), trace, world)
+    for _ in range(1500):
+        sim.write(setpoint(arm=(0.0, 0.4, 0.0, 0.0, 0.0, 0.0, 0.0)))
+    sim.close()
+    rows = read(tmp_path / "t").rows
+    assert rows["touch"][:50].max() == 0.0 and rows["touch"].max() > 1.0
+    assert rows["contacts"].any() == contacts
 
 
 def test_a_cut_severs_what_is_between_the_blades_and_the_trace_says_so(tmp_path: Path) -> None:

@@ -477,4 +477,5 @@ class SimulatedRobot:
         row["epoch"], row["sequence"] = setpoint.epoch, setpoint.sequence
         row["cutter"] = CUTTER.index(self._cutter.state)
         row["contacts"], row["self_contacts"] = self.contacts, self.self_contacts
+        row["touch"] = self.true_touch()[0] if self.contacts or self._pushes else 0.0
         trace.commit()

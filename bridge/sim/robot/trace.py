@@ -33,6 +33,7 @@ ROW = np.dtype(
         ("cutter", "u1"),  # index in CUTTER
         ("contacts", "<u2"),  # contacts of the robot with posts, trunks, cordons and wires
         ("self_contacts", "<u2"),  # contacts of arm and tool with each other and with the base
+        ("touch", "<f4"),  # sum of the forces between robot and row, those of elastic canes included (N)
     ]
 )
 CUTTER = ("open", "closing", "opening", "jammed")

@@ -1,6 +1,7 @@
 """A simulated robot beside one obstacle: led against it by hand, or at work, with the truth of every touch."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import msgspec
 import numpy as np
@@ -9,10 +10,12 @@ from bridge.config import BridgeConfig
 from bridge.core.bridge import TICK_S, BridgeCore
 from bridge.core.odometer import Odometer
 from bridge.sim.robot.robot import SimulatedRobot
+from bridge.sim.robot.trace import TraceWriter
 from bridge.sim.vineyard.row import Rod, Row
 from bridge.sim.world.config import CALM, WorldConfig
 from controller.config import ControllerConfig
 from controller.core import Controller
+from controller.motion.contact import Spots
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
 from rolling_panda.config import RobotConfig, load_section
@@ -35,6 +38,21 @@ AT_REST = 0.01
 _SPACING_M, _FIRST_M, _AHEAD = 0.12, 0.6, 4
 
 
+@dataclass(frozen=True)
+class Moment:
+    """A ms of a protective stop.
+
+    Attributes:
+        at: Time (s).
+        commanded: Whether the newest command was to move.
+        speed: Of the fastest spot of base, arm and tool, by the truth (m/s).
+    """
+
+    at: float
+    commanded: bool
+    speed: float
+
+
 def capsule_of(rod: Rod, shift: Array | None = None) -> Capsule:
     """What perception says of a rod, which it may see elsewhere (3, m)."""
     by = np.zeros(3) if shift is None else shift
@@ -49,7 +67,9 @@ class ContactWorld(RobotWorld):
         touches: For each ms in which the row touched the robot: time (s), force (N), body of the robot.
         modes: Time (s) of each change of mode, and the mode.
         rests: Times (s) of the ms in which nothing was sent but zero and nothing moved.
-        events: Lines of the log.
+        stopped: Each ms of protective stops.
+        events: Reasons of the lines of the log.
+        log: The lines themselves.
     """
 
     def __init__(
@@ -61,6 +81,7 @@ class ContactWorld(RobotWorld):
         seed: int = 0,
         config: ControllerConfig | None = None,
         canes: Sequence[Rod] = (),
+        trace: TraceWriter | None = None,
     ) -> None:
         """Arm the robot.
 
@@ -72,6 +93,7 @@ class ContactWorld(RobotWorld):
             seed: Of the disturbances.
             config: Section `[controller]`.
             canes: What perception knows as canes, and not as obstacles: nobody has decided that they stay.
+            trace: Records every step.
         """
         # There is no camera, so that nothing is looked at from near.
         settings = controller_config(
@@ -81,13 +103,16 @@ class ContactWorld(RobotWorld):
         bridge = msgspec.structs.replace(
             load_section(resource("assets/config/sim.toml"), "bridge", BridgeConfig), start_arm=posture
         )
-        self.robot = SimulatedRobot(bridge, Row(tuple(rods)), Blind(), None, world, seed)
+        self.robot = SimulatedRobot(bridge, Row(tuple(rods)), Blind(), trace, world, seed)
         odometer = Odometer(MODEL.drive, bridge.odometry, TICK_S, seed)
         self.held: TeleopTarget | None = None
         self.touches: list[tuple[float, float, str]] = []
         self.modes: list[tuple[float, m.Mode]] = []
         self.rests: list[float] = []
+        self.stopped: list[Moment] = []
+        self._spots = Spots(MODEL)
         self.events: list[m.Reason] = []
+        self.log: list[m.LogEvent] = []
         self.cut_ids: set[str] = set()
         self._canes = tuple((vector3(rod.start), vector3(rod.end)) for rod in canes)
         self._seen, self._shown, self._moving = tuple(seen), 0, False
@@ -159,6 +184,20 @@ class ContactWorld(RobotWorld):
         measured = self.robot.read()
         if not self._moving and float(np.abs(measured.velocity).max()) < AT_REST:
             self.rests.append(self.now)
+        if self.controller.mode == "PROTECTIVE_STOP":
+            self.stopped.append(Moment(self.now, self._moving, self._fastest(measured.velocity)))
+
+    def _fastest(self, velocity: Array) -> float:
+        """Speed (m/s) of the fastest spot of the robot at these speeds of wheels and joints (9, rad/s)."""
+        base = self.robot.true_base()
+        places, by_joint = self._spots.at(self.configuration())
+        (x, y, heading), (forward, aside, turning) = base.pose, base.velocity
+        c, s = np.cos(heading), np.sin(heading)
+        carried = np.array([c * forward - s * aside, s * forward + c * aside, 0.0])
+        arm = np.zeros_like(places)
+        arm[:, 0], arm[:, 1] = -turning * (places[:, 1] - y), turning * (places[:, 0] - x)
+        arm += carried + np.einsum("j,njk->nk", velocity[2:], by_joint)
+        return float(max(np.linalg.norm(arm, axis=1).max(), np.linalg.norm(carried)))
 
     def say(self, message: m.Message) -> None:
         """Send a message; what the controller says of itself is kept."""
@@ -168,6 +207,7 @@ class ContactWorld(RobotWorld):
                 self.state = message
             case m.LogEvent():
                 self.events.append(message.reason)
+                self.log.append(message)
             case m.MotionCommand():
                 self._moving = any(message.xi)
             case m.CutCommand():
