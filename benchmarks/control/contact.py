@@ -25,7 +25,7 @@ from rolling_panda.messages.types import WoodClass
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import ARM_Q, RobotModel
 from rolling_panda.model.wire_values import vector3
-from tests.support.worlds.contact_world import ContactWorld, capsule_of
+from tests.support.worlds.contact_world import ContactWorld, Moment, capsule_of
 
 #: Radius of each obstacle (m), and whether it stands upright.
 KINDS: dict[WoodClass, tuple[float, bool]] = {
@@ -41,8 +41,12 @@ PARTS, SPEEDS = ("link4", "link5", "link6", "cutter"), (0.05, 0.1, 0.2, 0.4)
 _RUN_UP, _HALF, _CANE = 0.12, 0.35, (0.05, 0.4)
 #: Error of perception where it has seen the obstacle (m): beyond what the collision guard keeps.
 _FARTHER = 0.03
-#: Fastest joint (rad/s), least distance of all else at the start (m), and time after the first touch (s).
-_FASTEST, _CLEAR, _AFTER_S = 1.2, 0.03, 2.6
+#: Fastest joint (rad/s), and least distance of all else at the start (m).
+_FASTEST, _CLEAR = 1.2, 0.03
+#: From the first touch the arm is led on for so long (s). After a stop the way back has so long, and then the end (s).
+_AFTER_S, _BACK_S, _END_S = 2.6, 8.0, 0.5
+#: The robot is at rest where no spot of base, arm and tool is faster (m/s): what pushes it makes it creep.
+AT_REST = 0.01
 #: Time until an obstacle must have been met (s), and draws of a posture.
 _LIMIT_S, _DRAWS = 8.0, 400
 #: Forces below this are no contact (N).
@@ -62,7 +66,10 @@ class Trial:
         detected: Whether the robot stopped for it.
         peak_n: Largest sum of contact forces until rest (N).
         to_stop_s: From the first touch to the protective stop (s); None without one.
-        to_rest_s: From the first touch to rest (s); None without rest.
+        to_zero_s: From the protective stop to the first command to stand (s); None without one.
+        to_rest_s: From the protective stop to rest, which lasts until the way back begins (s); None without rest.
+        rests_at_end: Whether the robot is at rest after the way back; None without a stop.
+        back: Whether the way back was gone to its end; None where none was told.
         left_n: Force that is left after the way back (N).
         reason: Code of the reason, and what it names.
         named: The named obstacle is the right one; None where it was not seen.
@@ -77,7 +84,10 @@ class Trial:
     detected: bool = False
     peak_n: float = 0.0
     to_stop_s: float | None = None
+    to_zero_s: float | None = None
     to_rest_s: float | None = None
+    rests_at_end: bool | None = None
+    back: bool | None = None
     left_n: float = 0.0
     reason: str = ""
     named: bool | None = None
@@ -165,17 +175,20 @@ def run_trial(scene: Scene, trial: Trial, seed: int) -> Trial:
     loop = ContactWorld((rod,), seen, scene.arm.tolist(), only(("cane_modulus",), "field"), seed)
     loop.hold(joints=scene.joints)
     loop.run_until(lambda: bool(_hard(loop)) or loop.touch is not None, _LIMIT_S)
-    loop.run(_AFTER_S if _hard(loop) else 0.0)
+    if _hard(loop) and loop.run_until(lambda: loop.touch is not None, _AFTER_S):
+        loop.run_until(lambda: _way_back(loop) is not None, _BACK_S)
+        loop.run(_END_S)
     touches = _hard(loop)
     if not touches:
         return trial
     began = touches[0][0]
-    rest = next((at for at in loop.rests if at > began), None)
-    until = math.inf if rest is None else rest
-    hardest = max((each for each in touches if each[0] <= until), key=lambda each: each[1])
+    stopped = next((at for at, mode in loop.modes if mode == "PROTECTIVE_STOP" and at >= began), None)
+    standing = Standing() if stopped is None else standing_after(loop.stopped, stopped)
+    # What touches it on the way back is told by what is left.
+    hardest = max((each for each in touches if each[0] <= standing.until), key=lambda each: each[1])
     told = loop.touch
     values = {} if told is None else dict(told.values)
-    stopped = next((at for at, mode in loop.modes if mode == "PROTECTIVE_STOP" and at >= began), None)
+    last = loop.stopped[-1] if loop.stopped else None
     return Trial(
         trial.kind,
         trial.part,
@@ -185,12 +198,57 @@ def run_trial(scene: Scene, trial: Trial, seed: int) -> Trial:
         detected=told is not None and told.code.startswith("touched"),
         peak_n=hardest[1],
         to_stop_s=None if stopped is None else stopped - began,
-        to_rest_s=None if rest is None or told is None else rest - began,
+        to_zero_s=standing.zero_s,
+        to_rest_s=standing.rest_s,
+        rests_at_end=None if last is None else not last.commanded and last.speed < AT_REST,
+        back=_way_back(loop),
         left_n=max((force for at, force, _ in touches if at > loop.now - 0.2), default=0.0),
         reason="" if told is None else f"{told.code} {values.get('part', '')} {values.get('other', '')}".strip(),
         named=str(values.get("other", "")).startswith(trial.kind) if trial.seen and told is not None else None,
         part_right=None if told is None else abs(_joint(str(values.get("part", ""))) - _joint(hardest[2])) <= 1,
     )
+
+
+@dataclass(frozen=True)
+class Standing:
+    """How the robot stood after a stop, before it went back.
+
+    Attributes:
+        zero_s: From the stop to the first command to stand (s); None without one.
+        rest_s: From the stop to rest (s); None without rest.
+        until: When the way back began (s); infinite without one.
+    """
+
+    zero_s: float | None = None
+    rest_s: float | None = None
+    until: float = math.inf
+
+
+def standing_after(moments: Sequence[Moment], stop: float) -> Standing:
+    """How the robot stood after a stop at `stop` (s).
+
+    Rest that is broken again before the way back is none: an arm that swings has moments without speed. Without a way
+    back rest lasts until the end.
+    """
+    after = [each for each in moments if each.at >= stop]
+    zero = next((k for k, each in enumerate(after) if not each.commanded), None)
+    if zero is None:
+        return Standing()
+    back = next((k for k, each in enumerate(after) if k > zero and each.commanded), len(after))
+    rest = back
+    while rest > zero and after[rest - 1].speed < AT_REST:
+        rest -= 1
+    return Standing(
+        after[zero].at - stop,
+        after[rest].at - stop if rest < back else None,
+        after[back].at if back < len(after) else math.inf,
+    )
+
+
+def _way_back(loop: ContactWorld) -> bool | None:
+    """Whether the way back was gone to its end; None before it has ended."""
+    codes = {event.code for event in loop.events}
+    return True if "backed_off" in codes else False if "not_backed_off" in codes else None
 
 
 def _hard(loop: ContactWorld) -> list[tuple[float, float, str]]:
@@ -259,14 +317,20 @@ def summarise(trials: Sequence[Trial]) -> dict[str, Figure]:
     hard = [trial for trial in met if trial.peak_n >= ControllerConfig().contact.stop_force]
     named = [trial.named for trial in found if trial.named is not None]
     rests = [trial.to_rest_s for trial in found if trial.to_rest_s is not None]
+    zeros = [trial.to_zero_s for trial in found if trial.to_zero_s is not None]
     return {
         "detected": share(len(found), len(met)),
         "detected_of_hard": share(sum(trial.detected for trial in hard), len(hard)),
         "peak_n_median": quantile([trial.peak_n for trial in met], 0.5),
         "peak_n_p95": quantile([trial.peak_n for trial in met], 0.95),
         "to_stop_s_median": quantile([t.to_stop_s for t in found if t.to_stop_s is not None], 0.5),
+        "to_zero_s_median": quantile(zeros, 0.5),
+        "to_zero_s_p95": quantile(zeros, 0.95),
         "to_rest_s_median": quantile(rests, 0.5),
         "to_rest_s_p95": quantile(rests, 0.95),
+        "rests_before_way_back": share(len(rests), len(found)),
+        "rests_at_end": share(sum(bool(trial.rests_at_end) for trial in found), len(found)),
+        "way_back_gone": share(sum(bool(trial.back) for trial in found), len(found)),
         "free_after": share(sum(trial.left_n <= 1.0 for trial in found), len(found)),
         "named_right": share(sum(map(bool, named)), len(named)),
         "part_right": share(sum(bool(trial.part_right) for trial in found), len(found)),
@@ -283,6 +347,9 @@ def main(argv: Sequence[str]) -> int:
     parser.add_argument("--kind", action="append", choices=tuple(KINDS), help="may be given several times; all")
     parser.add_argument("--preset", action="append", choices=tuple(PRESETS), help="worlds to work in; all")
     parser.add_argument("--count", type=int, default=40, help="trials of each kind (default: %(default)s)")
+    parser.add_argument(
+        "--every", type=int, default=1, metavar="N", help="only each N-th trial of a kind (default: all)"
+    )
     parser.add_argument("--seconds", type=float, default=600.0, help="work in each world (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=0, help="first seed (default: %(default)s)")
     words: argparse.Namespace = parser.parse_args(argv)
@@ -309,7 +376,7 @@ def main(argv: Sequence[str]) -> int:
         keep()
     kinds: tuple[WoodClass, ...] = tuple(words.kind or KINDS)
     # All kinds in turn: a run that is ended early has something of each.
-    for number in range(words.count):
+    for number in range(0, words.count, max(1, words.every)):
         for kind in kinds:
             rng = np.random.default_rng([words.seed + number, list(KINDS).index(kind)])
             part, speed = PARTS[number % len(PARTS)], SPEEDS[(number // len(PARTS)) % len(SPEEDS)]
@@ -326,7 +393,10 @@ def main(argv: Sequence[str]) -> int:
             f"{kind}: {sum(trial.touched for trial in group)} contacts, "
             f"detected {_told(figures['detected'], 100, ' %')}, "
             f"peak {_told(figures['peak_n_median'])} N, p95 {_told(figures['peak_n_p95'])} N, "
-            f"rest after {_told(figures['to_rest_s_median'], 1000)} ms, "
+            f"told to stand after {_told(figures['to_zero_s_median'], 1000)} ms, "
+            f"p95 {_told(figures['to_zero_s_p95'], 1000)} ms, "
+            f"at rest before the way back {_told(figures['rests_before_way_back'], 100, ' %')}, "
+            f"after {_told(figures['to_rest_s_median'], 1000)} ms, "
             f"p95 {_told(figures['to_rest_s_p95'], 1000)} ms, named {_told(figures['named_right'], 100, ' %')}",
             flush=True,
         )
