@@ -655,6 +655,7 @@ def summarise(runs: Sequence[VineRun]) -> dict[str, Figure]:
         "machine_60_s": share(sum(run.machine_s <= 60.0 for run in left), len(left)),
         "person_s_median": quantile([run.person_s for run in left], 0.5),
         "person_10_s": share(sum(run.person_s <= 10.0 for run in left), len(left)),
+        "both_s_median": quantile([run.machine_s + run.person_s for run in left], 0.5),
         "decisions_median": quantile([float(run.decisions) for run in runs], 0.5),
         "cuts_asked_median": quantile([float(len(run.places)) for run in runs], 0.5),
     }

@@ -293,6 +293,7 @@ def test_shares_are_of_the_cuts_with_room_and_seconds_of_the_vines_that_were_lef
     assert figures["blocked"].value == pytest.approx(1 / 7)
     assert figures["harmed"].value == figures["machine_60_s"].value - 2 / 3 + 0.25 == 0.25
     assert figures["machine_s_most"].value == 80.0 and figures["left_the_vine"].value == 0.75
+    assert figures["both_s_median"].value == 20.0 + 4 * 3.0 + 2.0
     assert figures["person_10_s"].value == pytest.approx(1 / 3), "three decisions of three seconds are more than 10 s"
 
 
