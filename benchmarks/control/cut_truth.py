@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -10,8 +10,13 @@ from bridge.sim.vineyard.row import Array, Row
 from bridge.sim.vineyard.truth import RightCut, judge, judge_guyot
 from rolling_panda.messages.types import CutKind
 
-#: In place of a cane's number: the stub.
-STUB = -1
+#: In place of a cane's number: the stub, and last year's cane of a Guyot vine.
+STUB, OLD_CANE = -1, -2
+#: What a cut is for. The removal of last year's cane is never proposed, so that no message has that kind.
+WantedKind = CutKind | Literal["removal"]
+#: Cane's number of wood that is no cane, by class, and what stays below its cut.
+_WOOD = {"spur": STUB, "cordon": OLD_CANE}
+_STAYS = {STUB: "the cane", OLD_CANE: "the head"}
 
 
 @dataclass(frozen=True)
@@ -21,7 +26,7 @@ class WantedCut:
     Attributes:
         vine: Vine along the row.
         spur: Spur on the vine.
-        cane: Cane on the spur; `STUB` for the spur's own wood.
+        cane: Cane on the spur; `STUB` for the spur's own wood, `OLD_CANE` for last year's cane beside it.
         kind: What the cut is for.
         cut: Where it is right; None where this wood stays as it is.
         nodes: Middles of its count nodes, base first (N×3, m, world).
@@ -30,7 +35,7 @@ class WantedCut:
     vine: int
     spur: int
     cane: int
-    kind: CutKind
+    kind: WantedKind
     cut: RightCut | None
     nodes: Array
 
@@ -55,7 +60,10 @@ class TrueCut:
 
 
 def wanted_cuts(row: Row, guyot: bool = False) -> tuple[WantedCut, ...]:
-    """The right cuts of a row before the first one: of spur-pruned vines, or of the spurs of Guyot vines."""
+    """The right cuts of a row before the first one, of spur-pruned or Guyot vines.
+
+    A Guyot vine asks for three: one on each cane of its spur, and the removal of last year's cane.
+    """
     none, out = np.zeros((0, 3)), list[WantedCut]()
     if not guyot:
         for spur in judge(row):
@@ -73,6 +81,7 @@ def wanted_cuts(row: Row, guyot: bool = False) -> tuple[WantedCut, ...]:
             middles = [rod.at(0.5)[0] for rod in own if rod.kind == "node"][1:]
             out.append(WantedCut(vine.vine, 0, cane, kind, cut, np.array(middles).reshape(-1, 3)))
         out.append(WantedCut(vine.vine, 0, STUB, "renewal cut", None, none))
+        out.append(WantedCut(vine.vine, 0, OLD_CANE, "removal", vine.removal, none))
     return tuple(out)
 
 
@@ -86,19 +95,22 @@ def true_cut(wanted: Iterable[WantedCut], pieces: Iterable[Mapping[str, Any]]) -
     known = {(each.vine, each.spur, each.cane): each for each in wanted}
     right, harm, cane, nodes, past = False, "", False, None, None
     for piece in pieces:
-        stub, place = piece["kind"] == "spur", np.array(piece["point"])
-        found = known.get((piece["vine"], piece["spur"], STUB if stub else piece["cane"]))
+        place, number = np.array(piece["point"]), _WOOD.get(piece["kind"], piece["cane"])
+        # A Guyot vine has one spur; last year's cane is beside it and has none.
+        spur = 0 if number == OLD_CANE else piece["spur"]
+        found = known.get((piece["vine"], spur, number))
         if found is None:
             continue
+        stub = number == STUB
         cut, name = found.cut, f"vine {found.vine}, spur {found.spur}"
         if cut is None:
             harm = f"{name}: the {'stub below the cane that stays' if stub else 'short cane that stays'} was cut"
             continue
         cane, past = True, cut.past_best(place)
-        if not stub:
+        if number >= 0:
             nodes = int(np.sum((found.nodes - place) @ cut.tangent < 0.0))
         if float((place - cut.least) @ cut.tangent) < 0.0:
-            harm = f"{name}: {'the cane' if stub else 'a node'} that stays was cut off"
+            harm = f"{name}: {_STAYS.get(number, 'a node')} that stays was cut off"
         else:
             right = right or cut.past_most(place) <= 0.0
     return TrueCut(right and not harm, harm, cane, nodes, past)

@@ -21,7 +21,7 @@ import numpy as np
 from benchmarks.common.documents import bench_parser, write
 from benchmarks.common.intervals import Figure, quantile, share
 from benchmarks.control.cane_touches import CaneTouches
-from benchmarks.control.cut_truth import WantedCut, true_cut, wanted_cuts
+from benchmarks.control.cut_truth import OLD_CANE, WantedCut, true_cut, wanted_cuts
 from benchmarks.control.row import check_camera, codes, judged_cuts, named, row_of, sim_config
 from benchmarks.control.row_report import Cut
 from benchmarks.control.row_stages import STAGES, StageClock
@@ -45,6 +45,7 @@ from rolling_panda import messages as m
 from rolling_panda.commands import SURE
 from rolling_panda.config import load_section
 from rolling_panda.errors import InputError
+from rolling_panda.reasons import old_cane_left
 from tests.support.worlds.closed_loop import ClosedLoop
 
 Training = Literal["spur", "guyot"]
@@ -84,6 +85,8 @@ _SPUR_NEAR = 0.10
 _LOOK_EVERY = 4
 #: Vines whose growth conditions do not name.
 USUAL = "standard"
+#: Code of the reason that is told of last year's cane.
+_OLD_CANE_LEFT = old_cane_left().code
 #: Wood this near to a point, this far past the cut, still stands (m).
 _STANDS, _BEYOND = 0.012, 0.03
 
@@ -173,6 +176,15 @@ class VineRun:
     def condition(self) -> str:
         """In words what it shares with the other vines of its figures."""
         return condition(self.training, self.cultivar, self.preset, self.review, self.decision_s)
+
+    def as_the_rule_says(self, with_room: bool = False) -> bool:
+        """Whether every cut that the vine asks for was made where it is right, and nothing that stays was cut off.
+
+        Args:
+            with_room: Whether cuts that leave no room for the blades are left out.
+        """
+        asked = (place for place in self.places if not (with_room and place.blocked))
+        return all(place.outcome == "right" for place in asked) and not any(cut.harm for cut in self.cuts)
 
     @property
     def person_s(self) -> float:
@@ -509,7 +521,8 @@ def prune_vine(
         config = sim_config(Path(folder) / "vine.toml", pictures, world, settings)
         with ClosedLoop(seed, path, config, "hierarchy", watch, segmenter=segmenter) as loop:
             before = row_of(loop)
-            touches, wanted = CaneTouches(staying_rods(before)), wanted_cuts(before, training == "guyot")
+            guyot = training == "guyot"
+            touches, wanted = CaneTouches(staying_rods(before, guyot)), wanted_cuts(before, guyot)
             clock = StageClock(load_section(config, "controller", ControllerConfig))
             visit = Visit(loop, Reviewer(loop, decision_s, review, glance_s), clock, length)
             if preset != "calm":
@@ -580,7 +593,7 @@ def places(
         reviewer: With every point that was proposed, and the accepted ones.
         ends: Entries of the queue at the end.
         sites: Undecided sites at the end of the visit, followed by those that the reviewer left. The last site of a
-            spur gives its reason.
+            spur gives its reason; what is told of last year's cane is that cane's reason alone.
     """
     asked = [(each, each.cut) for each in wanted if each.cut is not None]
     pieces = [piece for bite in bites for piece in bite["severed"]]
@@ -588,16 +601,17 @@ def places(
     for point in reviewer.points.values() if asked else ():
         rod = nearest_rod(row, np.array(point.position))[1]
         proposed.setdefault((rod.vine, rod.spur, point.kind), []).append(point.point_id)
-    left = {_spur_at(row, site): codes(site.reason) for site in sites}
+    left = [(_spur_at(row, site), codes(site.reason)) for site in sites]
+    of_spurs = {spur: reason for spur, reason in left if reason != _OLD_CANE_LEFT}
+    of_old_canes = of_spurs | {spur: reason for spur, reason in left if reason == _OLD_CANE_LEFT}
     out = []
     for each, cut in asked:
         truth = true_cut([each], pieces)
         own = proposed.get((each.vine, each.spur, each.kind), [])
         taken = [point_id for point_id in own if point_id in reviewer.accepted or point_id in reviewer.refusals]
-        outcome: Outcome = "unseen"
-        reason = ""
+        outcome: Outcome
         if truth.right:
-            outcome = "right"
+            outcome, reason = "right", ""
         elif truth.right_cane or truth.harm:
             outcome, reason = "wrong", truth.harm
         elif any(point_id in ends and ends[point_id].state == "DONE" for point_id in taken):
@@ -606,8 +620,9 @@ def places(
             outcome, reason = "refused", ", ".join(_why(point_id, reviewer, ends) for point_id in taken)
         elif own:
             outcome, reason = "undecided", "not decided"
-        elif (each.vine, each.spur) in left:
-            outcome, reason = "undecided", left[each.vine, each.spur]
+        else:
+            told = (of_old_canes if each.cane == OLD_CANE else of_spurs).get((each.vine, each.spur))
+            outcome, reason = ("unseen", "") if told is None else ("undecided", told)
         out.append(Place(each.spur, each.kind, blocked_by(row, cut), outcome, reason))
     return tuple(out)
 
@@ -646,6 +661,8 @@ def summarise(runs: Sequence[VineRun]) -> dict[str, Figure]:
         **{outcome: share(sum(p.outcome == outcome for p in possible), len(possible)) for outcome in OUTCOMES},
         "blocked": share(len(asked) - len(possible), len(asked)),
         "harmed": share(sum(bool(cut.harm) for cut in cuts), len(cuts)),
+        "vines_as_the_rule_says": share(sum(run.as_the_rule_says() for run in runs), len(runs)),
+        "vines_with_room_as_ruled": share(sum(run.as_the_rule_says(with_room=True) for run in runs), len(runs)),
         "right_of_made": share(sum(cut.true_right for cut in made), len(made)),
         "left_the_vine": share(len(left), len(runs)),
         "vines_with_contact": share(sum(run.contacts + run.self_contacts > 0 for run in runs), len(runs)),

@@ -10,7 +10,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from benchmarks.control import vine as bench
-from benchmarks.control.cut_truth import STUB, wanted_cuts
+from benchmarks.control.cut_truth import OLD_CANE, STUB, wanted_cuts
 from benchmarks.control.row_report import Cut
 from benchmarks.control.vine_plot import draw_vine
 from bridge.sim import build
@@ -169,8 +169,12 @@ def asked_for(count):
 
 def bite(each, past=0.0):
     where = each.cut.best + past * each.cut.tangent
-    kind = "spur" if each.cane == STUB else "cane"
-    piece = {"vine": each.vine, "spur": each.spur, "cane": each.cane, "kind": kind, "point": where.tolist()}
+    # As the trace has it: wood that is no cane has no cane's number, and last year's cane has no spur's either.
+    kind, spur, cane = {
+        STUB: ("spur", each.spur, -1),
+        OLD_CANE: ("cordon", -1, -1),
+    }.get(each.cane, ("cane", each.spur, each.cane))
+    piece = {"vine": each.vine, "spur": spur, "cane": cane, "kind": kind, "point": where.tolist()}
     return {"event": "cut", "point_id": f"p{each.spur}", "code": "wood_severed", "severed": [piece]}
 
 
@@ -206,13 +210,45 @@ def test_every_cut_that_the_vine_asks_for_has_one_outcome_with_its_reason():
 def test_of_a_guyot_vine_both_canes_of_the_spur_are_asked_for_and_its_stub_stays():
     row = grow(VineyardConfig(vines=1, training="guyot"), 3)
     wanted = wanted_cuts(row, guyot=True)
-    assert [each.kind for each in wanted if each.cut is not None] == ["spur cut", "cane cut"]
+    assert [each.kind for each in wanted if each.cut is not None] == ["spur cut", "cane cut", "removal"]
     reviewer = SimpleNamespace(points={}, accepted={}, refusals={})
-    lower, upper, stub = wanted
+    lower, upper, stub, _ = wanted
     found = bench.places(row, wanted, [bite(lower), bite(upper)], reviewer, {}, [])
-    assert [each.outcome for each in found] == ["right", "right"]
+    assert [each.outcome for each in found] == ["right", "right", "unseen"]
     piece = {"vine": 0, "spur": 0, "cane": STUB, "kind": "spur", "point": [0.0, 0.0, 0.0]}
     assert "stays" in bench.true_cut([stub], [piece]).harm
+
+
+def test_the_removal_of_last_years_cane_is_asked_for_and_has_its_own_reason():
+    row = grow(VineyardConfig(vines=1, training="guyot"), 3)
+    wanted = wanted_cuts(row, guyot=True)
+    lower, upper, _, old = wanted
+    reviewer = SimpleNamespace(points={}, accepted={}, refusals={})
+    stub = next(rod for _, rod in row.standing() if rod.kind == "spur")
+
+    def outcomes(bites, *told):
+        sites = [
+            m.UndecidedSite(reason=each, needs="operator", vine=1, spur=1, position=tuple(stub.end.tolist()))
+            for each in told
+        ]
+        found = bench.places(row, wanted, bites, reviewer, {}, sites)
+        return [(each.kind, each.outcome, each.reason) for each in found]
+
+    few = reasons.nodes_lacking(5, 8)
+    for told in ([reasons.old_cane_left(), few], [few, reasons.old_cane_left()]):
+        assert outcomes([bite(lower)], *told) == [
+            ("spur cut", "right", ""),
+            ("cane cut", "undecided", "nodes_lacking"),
+            ("removal", "undecided", "old_cane_left"),
+        ]
+    # Whoever leaves the whole spur to a person leaves that cane, too; nothing told of it is nothing seen.
+    assert outcomes([], few)[2] == ("removal", "undecided", "nodes_lacking")
+    assert [each[1] for each in outcomes([bite(lower), bite(upper)], reasons.old_cane_left())[:2]] == ["right"] * 2
+    assert outcomes([])[2] == ("removal", "unseen", "")
+    assert outcomes([bite(old)])[2] == ("removal", "right", "")
+    _, outcome, harm = outcomes([bite(old, -0.03)])[2]
+    assert outcome == "wrong" and "the head that stays" in harm
+    assert outcomes([bite(old, 0.2)])[2][1] == "wrong", "shoots of last year's cane stay"
 
 
 class Stopping:
@@ -295,6 +331,26 @@ def test_shares_are_of_the_cuts_with_room_and_seconds_of_the_vines_that_were_lef
     assert figures["machine_s_most"].value == 80.0 and figures["left_the_vine"].value == 0.75
     assert figures["both_s_median"].value == 20.0 + 4 * 3.0 + 2.0
     assert figures["person_10_s"].value == pytest.approx(1 / 3), "three decisions of three seconds are more than 10 s"
+
+
+@pytest.mark.parametrize(
+    ("outcomes", "blocked", "harm", "as_ruled", "with_room"),
+    [
+        (("right", "right"), "", "", True, True),
+        (("right", "right"), "wire", "", True, True),
+        (("right", "undecided"), "", "", False, False),
+        (("unseen",), "", "", False, False),
+        (("refused",), "wire", "", False, True),
+        (("right", "right"), "", "a node", False, False),
+        (("refused",), "wire", "a node", False, False),
+    ],
+)
+def test_a_vine_is_as_the_rule_says_where_every_cut_is_right_and_nothing_that_stays_is_gone(
+    outcomes, blocked, harm, as_ruled, with_room
+):
+    figures = bench.summarise([run(1, outcomes, blocked, harm), run(2, ("wrong",))])
+    whole, room = figures["vines_as_the_rule_says"], figures["vines_with_room_as_ruled"]
+    assert (whole.value, whole.n) == (as_ruled / 2, 2) and (room.value, room.n) == (with_room / 2, 2)
 
 
 def test_a_run_goes_on_where_the_last_one_stopped_and_its_file_is_drawn(tmp_path: Path, monkeypatch, capsys):

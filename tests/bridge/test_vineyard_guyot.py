@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
-from bridge.sim.vineyard.truth import judge, judge_guyot
+from bridge.sim.vineyard.truth import judge, judge_guyot, staying_rods
 
 GUYOT = VineyardConfig(training="guyot")
 seeds = st.integers(0, 2**31)
@@ -52,3 +52,14 @@ def test_the_three_right_cuts_leave_two_nodes_eight_nodes_and_no_old_cane(seed):
 
 def test_shoots_without_a_stub_are_not_judged_as_spurs():
     assert {(truth.vine, truth.spur) for truth in judge(grow(GUYOT, 1))} == {(0, 0), (1, 0), (2, 0)}
+
+
+def test_two_nodes_of_the_lower_cane_stay_and_eight_of_the_upper_one():
+    row = grow(GUYOT, 1)
+    staying = [row.rods[number] for number in staying_rods(row, guyot=True)]
+    for truth in judge_guyot(row):
+        own = [rod for rod in staying if rod.vine == truth.vine]
+        assert {(rod.spur, rod.cane) for rod in own} == {(0, truth.lower), (0, truth.upper)}
+        nodes = [sum(rod.kind == "node" for rod in own if rod.cane == cane) for cane in (truth.lower, truth.upper)]
+        # With the basal bud, which is not counted.
+        assert truth.cane_cut is not None and nodes == [3, 9]

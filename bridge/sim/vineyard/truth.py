@@ -97,15 +97,21 @@ def judge(row: Row) -> tuple[SpurTruth, ...]:
     return tuple(_judge_spur(row, stubs[place], place, chains[place]) for place in sorted(chains) if place in stubs)
 
 
-def staying_rods(row: Row) -> frozenset[int]:
-    """Rods of the canes that the judge keeps, below the one that is cut through; `row` has not been cut yet."""
-    truth = {(spur.vine, spur.spur): spur for spur in judge(row)}
-    out = set()
-    for number, rod in row.standing():
-        spur = truth.get((rod.vine, rod.spur))
-        if spur is not None and spur.cut is not None and rod.cane == spur.keeper and number < spur.cut.rod:
-            out.add(number)
-    return frozenset(out)
+def staying_rods(row: Row, guyot: bool = False) -> frozenset[int]:
+    """Rods of the canes that the judge keeps, below the one that is cut through.
+
+    Args:
+        row: Not cut yet.
+        guyot: Whether its vines are Guyot vines, which keep two canes.
+    """
+    cuts: dict[tuple[int, int, int], RightCut | None]
+    if guyot:
+        pairs = [((v.vine, 0, v.lower), v.spur_cut) for v in judge_guyot(row)]
+        cuts = dict([*pairs, *(((v.vine, 0, v.upper), v.cane_cut) for v in judge_guyot(row))])
+    else:
+        cuts = {(spur.vine, spur.spur, spur.keeper): spur.cut for spur in judge(row)}
+    found = ((number, cuts.get((rod.vine, rod.spur, rod.cane))) for number, rod in row.standing())
+    return frozenset(number for number, cut in found if cut is not None and number < cut.rod)
 
 
 def _judge_spur(
