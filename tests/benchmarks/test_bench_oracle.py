@@ -60,6 +60,38 @@ def test_blades_slant_to_pass_a_cane_that_stays_beside_a_cut_between_nodes(searc
     assert plan is not None and 0.26 < abs(plan.approach[2]) <= 0.55
 
 
+GUYOT = grow(VineyardConfig(vines=1, training="guyot", rows_behind=0), 3601)
+
+
+def test_of_a_guyot_vine_both_canes_stay_and_last_years_cane_is_in_the_way_but_for_its_own_removal():
+    removal = next(each for each in wanted_cuts(GUYOT, guyot=True) if each.kind == "removal")
+    capsules = oracle.obstacles_of(GUYOT, guyot=True).capsules
+    canes = {(each.spur, each.cane) for each in capsules if each.kind == "cane"}
+    assert canes == {(each.spur, each.cane) for each in wanted_cuts(GUYOT, guyot=True) if each.cane >= 0 and each.cut}
+    cordons = [each for each in capsules if each.kind == "cordon"]
+    arm = [rod for _, rod in GUYOT.standing() if rod.kind == "cordon"]
+    assert len(cordons) == len(arm)
+    left = [each for each in oracle.obstacles_of(GUYOT, True, removal.cut.rod).capsules if each.kind == "cordon"]
+    assert left == [each for each in cordons if each.start != tuple(GUYOT.rods[removal.cut.rod].start)]
+    point = oracle.point_of(GUYOT, removal, removal.cut, guyot=True)
+    assert (point.vine, point.spur) not in {(each.vine, each.spur) for each in capsules}, "the spur's canes stay"
+
+
+@pytest.mark.long
+def test_the_fruiting_wire_alone_leaves_no_plan_for_the_removal_of_last_years_cane():
+    guyot = oracle.Oracle(guyot=True)
+    removal = next(each for each in wanted_cuts(GUYOT, guyot=True) if each.kind == "removal")
+    plan, reason = guyot.search(GUYOT, removal, removal.cut)
+    assert plan is None and "wire" in reason
+    rods = tuple(None if rod is not None and rod.kind == "wire" else rod for rod in GUYOT.rods)
+    plan, reason = guyot.search(replace(GUYOT, rods=rods), removal, removal.cut)
+    assert plan is not None and reason == ""
+    assert removal.cut.holds(removal.cut.rod, removal.cut.best + plan.along * removal.cut.tangent)
+    np.testing.assert_allclose(
+        plan.poses.cut.translation, removal.cut.best + plan.along * removal.cut.tangent, atol=1e-6
+    )
+
+
 @pytest.mark.long
 def test_the_command_tells_shares_and_reasons_and_writes_every_cut(tmp_path, capsys):
     path = tmp_path / "oracle.json"
@@ -75,7 +107,7 @@ def test_the_command_tells_shares_and_reasons_and_writes_every_cut(tmp_path, cap
 
 
 def test_rows_without_a_cut_and_wrong_numbers_are_told(monkeypatch, capsys):
-    monkeypatch.setattr(oracle, "wanted_cuts", lambda row: ())
+    monkeypatch.setattr(oracle, "wanted_cuts", lambda row, guyot: ())
     assert oracle.main(["--count", "1"]) == 0
     assert "No row has a right cut" in capsys.readouterr().out
     for words in (["--count", "0"], ["--vines", "0"]):
