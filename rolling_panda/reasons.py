@@ -1656,7 +1656,7 @@ def moved_below_nodes(user: str) -> None:
 
 @_reason("info", "")
 def old_cane_left() -> None:
-    """Last year's cane is left for a person."""
+    """Last year's cane is left for a person: the program takes it for a cordon, and keeps the blades off it."""
 
 
 @_reason("info", "")

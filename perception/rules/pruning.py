@@ -3,7 +3,8 @@
 Spur pruning: the lowest cane that is thick enough, else the thickest, becomes the new spur (the keeper). It is cut
 past its second count node. A renewal cut beyond the keeper removes the old stub with the other canes.
 
-Guyot pruning: of two canes the lower one becomes the next spur, and the upper one the fruiting cane.
+Guyot pruning: of two canes the lower one becomes the next spur, and the upper one the fruiting cane. Last year's cane
+is left for a person.
 
 Nothing is extrapolated: nodes that were not seen are not counted.
 """
@@ -49,7 +50,8 @@ _BASE, _LEAST_SINE, _THICK = 0.025, 0.2, 0.015
 #: Reasons against a cut that other pictures propose: they see its nodes or canes otherwise. All others only tell that a
 #: picture shows too little.
 _AGAINST = {"nodes_side_by_side", "nodes_far_apart", "cane_below_keeper", "keeper_close"}
-#: The Guyot rule never proposes the removal of last year's cane: its head is not visible from the front.
+#: The Guyot rule never proposes the removal of last year's cane: it has the class of a cordon, which the blades keep
+#: off, and the wire that it is tied to leaves them no room beside the head (docs/perception.md).
 _OLD_CANE: Final = reasons.old_cane_left()
 
 
