@@ -177,8 +177,9 @@ $(VENV)/.training: $(VENV)/.project requirements-training.lock
 
 # Others' controllers, for `make bench ARGS='reach --method hierarchy mink'`.
 peers: $(VENV)/.peers
-$(VENV)/.peers: $(VENV)/.project requirements-peers.lock
+$(VENV)/.peers: $(VENV)/.project requirements-peers.lock requirements-mpc.lock
 	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements-peers.lock -c requirements-peers.lock
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --require-hashes -r requirements-mpc.lock -c requirements-mpc.lock
 	@touch $@
 
 # The control code becomes machine code when it is first imported: better here than at the first start.
@@ -197,6 +198,10 @@ materials: $(VENV)/.project
 	$(BIN)/cyclonedx-py requirements requirements-run.lock --pyproject pyproject.toml --output-reproducible \
 		--output-format JSON --output-file build/materials.cdx.json
 
+# What model predictive control needs, locked apart: it is installed without its dependencies, which name an older
+# example-robot-data than the robot's model is from.
+MPC := crocoddyl==3.2.1 libcrocoddyl==3.2.1 libmim-solvers==0.3.0 mim-solvers==0.3.0
+
 lock:
 	$(PYTHON) -m venv build/lock
 	build/lock/bin/pip install --quiet 'pip-tools>=7.5,<8'
@@ -207,6 +212,17 @@ lock:
 		$(BIN)/python -c 'import sys, tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"][sys.argv[1]], sep="\n")' $$extra \
 			| $(COMPILE) --constraint requirements.lock --output-file requirements-$$extra.lock - || exit 1; \
 	done
+	rm -rf build/mpc
+	for processor in x86_64 aarch64; do \
+		build/lock/bin/pip download --quiet --no-deps --only-binary=:all: --python-version 3.11 --abi cp311 --abi none \
+			--platform manylinux_2_28_$$processor --dest build/mpc $(MPC) || exit 1; \
+	done
+	grep '^#' requirements-mpc.lock > build/mpc/lock
+	for name in $(MPC); do \
+		echo "$$name \\"; \
+		sha256sum build/mpc/$$(echo $$name | sed 's/-/_/g; s/==/-/')-*.whl | cut -c-64 | sort | sed 's/.*/    --hash=sha256:& \\/; $$s/ \\$$//'; \
+	done >> build/mpc/lock
+	mv build/mpc/lock requirements-mpc.lock
 
 clean:
 	rm -rf $(VENV) build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

@@ -12,7 +12,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -32,6 +32,8 @@ _BATCH = 4
 _SAMPLED, _SAMPLE_EVERY = 8, 10
 #: What counts as near (m, rad).
 _NEAR = 0.02, math.radians(5.0)
+#: Kinds of drawn goals.
+_KINDS = ("anywhere", "axis_free", "row")
 _runner: Runner | None = None
 
 
@@ -62,6 +64,11 @@ class Row:
     omega: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
     least_s: float | None = None
     steps_s: tuple[float, ...] = ()
+
+
+#: Targets, and where they are from; and rows by kind of goals and method.
+_Drawn = tuple[Sequence[Target], str]
+_Found = dict[tuple[str, MethodName], list[Row]]
 
 
 def main(argv: Sequence[str]) -> int:
@@ -144,9 +151,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--goals",
-        choices=("anywhere", "row"),
-        default="anywhere",
-        help="drawn goals: within ±4 m, or like cuts of a row beside the base (default: anywhere)",
+        choices=_KINDS,
+        nargs="+",
+        default=["anywhere"],
+        help="drawn goals: within ±4 m, the same with `--free-axis tool_y`, or like cuts of a row beside the base; one "
+        "kind, or several one after the other (default: anywhere)",
     )
     parser.add_argument("--free-axis", choices=("none", "tool_y"), default="none", help="of drawn targets")
     parser.add_argument(
@@ -157,6 +166,12 @@ def _parser() -> argparse.ArgumentParser:
         help="one, or several on the same goals (default: hierarchy); pink, mink, holistic and mpc need `make peers`",
     )
     parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), help="processes (default: all cores)")
+    parser.add_argument(
+        "--minutes",
+        type=float,
+        metavar="MINUTES",
+        help="take goals one after the other, each with all methods, in one process, and begin none after so long",
+    )
     parser.add_argument("--trajectories", type=Path, metavar="DIR", help="write t, q, xi of each target as npz here")
     return parser
 
@@ -164,61 +179,98 @@ def _parser() -> argparse.ArgumentParser:
 def _run(arguments: argparse.Namespace) -> int:
     if arguments.count < 1 or arguments.jobs < 1:
         raise RollingPandaError("--count and --jobs must be at least 1")
-    targets = (
-        reach_targets.read(arguments.targets)
-        if arguments.targets is not None
-        else reach_targets.draw(
-            arguments.seed, arguments.count, arguments.free_axis, arguments.starts == "anywhere", arguments.goals
-        )
-    )
+    if arguments.minutes is not None and arguments.targets is not None:
+        raise RollingPandaError("--minutes is for drawn goals; leave out --targets")
     for path in (arguments.trajectories, arguments.json.parent if arguments.json is not None else None):
         if path is not None:
             _made(path)
-    drawn = f"drawn: seed {arguments.seed}, free axis {arguments.free_axis}, goals {arguments.goals}"
-    documents = []
-    for method in arguments.method:
-        began = time.perf_counter()
-        rows = run(targets, method, arguments.seed, arguments.jobs, _folder(arguments, method))
-        summary = summarise(rows)
-        _print(method, rows, summary, time.perf_counter() - began)
-        samples = [{"target": row.target, "t": row.omega[0], "omega": row.omega[1]} for row in rows[:_SAMPLED]]
-        documents.append(
-            {
-                "method": method,
-                "targets": str(arguments.targets or drawn),
-                "summary": summary,
-                "samples": samples,
-                "results": [_flat(row) for row in rows],
-            }
-        )
+    kinds = ["file"] if arguments.targets is not None else list(dict.fromkeys(arguments.goals))
+    goals = {kind: _targets(arguments, kind) for kind in kinds}
+    documents: list[dict[str, Any]] = []
+    for found in (_each if arguments.minutes is None else _in_turn)(arguments, goals):
+        documents = [_document(kind, method, goals[kind][1], rows) for (kind, method), rows in found.items()]
         # Whoever waits for the slow ones has the others.
         write(arguments.json, documents[0] if len(documents) == 1 else {"methods": documents})
-    if len(documents) > 1:
-        _print_beside(documents)
+    for kind in kinds if len(arguments.method) > 1 else []:
+        _print_beside(kind, [document for document in documents if document["kind"] == kind])
     return 0
 
 
-def _folder(arguments: argparse.Namespace, method: str) -> Path | None:
-    """Where a method's trajectories go: with several methods, one folder each."""
-    if arguments.trajectories is None or len(arguments.method) == 1:
-        return cast("Path | None", arguments.trajectories)
-    return _made(arguments.trajectories / method)
+def _each(arguments: argparse.Namespace, goals: dict[str, _Drawn]) -> Iterator[_Found]:
+    """One method after the other, each on all goals of a kind."""
+    found: _Found = {}
+    for kind, (targets, _) in goals.items():
+        for method in arguments.method:
+            began = time.perf_counter()
+            rows = run(targets, method, arguments.seed, arguments.jobs, _folder(arguments, kind, method))
+            _print(method, rows, summarise(rows), time.perf_counter() - began)
+            found[kind, method] = rows
+            yield found
 
 
-def _print_beside(documents: Sequence[dict[str, Any]]) -> None:
+def _in_turn(arguments: argparse.Namespace, goals: dict[str, _Drawn]) -> Iterator[_Found]:
+    """One goal of each kind after the other, each with all methods: whenever it ends, all have had the same goals."""
+    began = time.perf_counter()
+    runners = {method: Runner(method, arguments.seed) for method in arguments.method}
+    found: _Found = {(kind, method): [] for kind in goals for method in runners}
+    for i in range(arguments.count):
+        if i and time.perf_counter() - began > 60.0 * arguments.minutes:
+            break
+        for (kind, method), rows in found.items():
+            rows.append(_row(runners[method], i, goals[kind][0][i], _folder(arguments, kind, method)))
+        print(f"{i + 1} of {arguments.count} goals of each kind", file=sys.stderr, flush=True)
+        yield found
+
+
+def _targets(arguments: argparse.Namespace, kind: str) -> _Drawn:
+    """The targets of a kind, and where they are from."""
+    if arguments.targets is not None:
+        return reach_targets.read(arguments.targets), str(arguments.targets)
+    free: reach_targets.FreeAxis = "tool_y" if kind == "axis_free" else arguments.free_axis
+    goals: reach_targets.Goals = "row" if kind == "row" else "anywhere"
+    targets = reach_targets.draw(arguments.seed, arguments.count, free, arguments.starts == "anywhere", goals)
+    return targets, f"drawn: seed {arguments.seed}, free axis {free}, goals {goals}"
+
+
+def _document(kind: str, method: MethodName, told: str, rows: Sequence[Row]) -> dict[str, Any]:
+    """What is written of one method and one kind of goals."""
+    return {
+        "method": method,
+        "kind": kind,
+        "targets": told,
+        "summary": summarise(rows),
+        "samples": [{"target": row.target, "t": row.omega[0], "omega": row.omega[1]} for row in rows[:_SAMPLED]],
+        "results": [_flat(row) for row in rows],
+    }
+
+
+def _folder(arguments: argparse.Namespace, kind: str, method: str) -> Path | None:
+    """Where a method's trajectories go: with several methods, or several kinds of goals, one folder each."""
+    folder: Path | None = arguments.trajectories
+    if folder is None:
+        return None
+    if len(arguments.goals) > 1:
+        folder = folder / kind
+    return _made(folder / method if len(arguments.method) > 1 else folder)
+
+
+def _print_beside(kind: str, documents: Sequence[dict[str, Any]]) -> None:
     """A line for each method."""
     print(
-        f"\n{'':<12}{'reached':>8}{'near':>6}{'there, s':>10}{'over bound':>12}{'clearance':>11}{'p99 of a step':>15}"
+        f"\n{kind:<12}{'reached':>8}{'95 %':>11}{'near':>6}{'there, s':>10}{'over bound':>12}{'clearance':>12}"
+        f"{'mean ω':>8}{'p99 of a step':>15}{'planning':>10}"
     )
     for document in documents:
         found = document["summary"]
+        low, high = found["reached_share_95"]
         there, over = (
             "–" if found[key] is None else f"{found[key]:.2f}"
             for key in ("settled_s_median", "settled_over_least_median")
         )
         print(
-            f"{document['method']:<12}{found['reached']:>8}{found['near']:>6}{there:>10}{over:>12}"
-            f"{1e3 * found['clearance_m_least']:>8.0f} mm{found['step_us_p99']:>12.0f} µs"
+            f"{document['method']:<12}{found['reached']:>8}{f'{low:.0%}–{high:.0%}':>11}{found['near']:>6}{there:>10}"
+            f"{over:>12}{1e3 * found['clearance_m_least']:>9.0f} mm{found['omega_mean']:>8.3f}"
+            f"{found['step_us_p99']:>12.0f} µs{found['planning_ms_mean']:>7.0f} ms"
         )
 
 

@@ -39,8 +39,9 @@ _STOPPING_S = 0.8
 #: A motion ends when the tool is nearer than this share of the tolerance and every joint and wheel as good as at rest
 #: (rad/s), so that it may stop within one period.
 _BETTER, _REST = 0.2, 0.02
-#: Periods within the tolerance after which a motion without a plan has ended.
-_HOVER = 100
+#: Periods within the tolerance after which a motion without a plan has ended, and periods at rest (rad/s) after which
+#: it has: it is stuck.
+_HOVER, _STUCK, _STILL = 100, 300, 1e-4
 
 
 @dataclass(frozen=True)
@@ -135,13 +136,18 @@ class Runner:
         if self._peer is not None:
             self._peer.aim(goal, free)
         loop, clock = _Loop(self.robot, q), 0.0
-        scale, there = 1.0, 0
+        scale, there, still = 1.0, 0, 0
         while loop.time < LIMIT_S - DT / 2:
             kinematics = self.robot.kinematics(loop.q)
             left = goal_error(kinematics.T_odom_tool, goal, free)
-            # Some peers hover about the goal.
+            # Some peers hover about the goal, and still move.
             there = there + 1 if within(left, POSITION, ROTATION) else 0
-            if there > _HOVER or (clock >= trajectory.duration and _arrived(left, loop.xi)):
+            still = still + 1 if float(np.abs(loop.xi).max()) < _STILL else 0
+            if (
+                (there > _HOVER and loop.can_stop)
+                or still > _STUCK
+                or (clock >= trajectory.duration and _arrived(left, loop.xi))
+            ):
                 break
             if loop.time > LIMIT_S - _STOPPING_S:
                 loop.stop()
@@ -196,6 +202,11 @@ class _Loop:
         self.time += DT
         self._rows.append(self.q)
         self._sent.append(self.xi)
+
+    @property
+    def can_stop(self) -> bool:
+        """Whether it comes to rest within one period, at half of the rated accelerations."""
+        return float((np.abs(self.xi) / self._slowing).max()) <= 1.0
 
     def stop(self) -> None:
         """One period of slowing down along the same direction, at half of the rated accelerations."""

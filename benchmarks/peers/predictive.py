@@ -1,10 +1,13 @@
-"""Whole-body model predictive control on Crocoddyl with the constrained SQP of mim-solvers, as Wang et al. (2025) do.
+"""Whole-body model predictive control on Crocoddyl with the SQP of mim-solvers, after the idea of Wang et al. (2025).
 
 State: base pose, arm joints, and the velocities ν = [v, φ̇, q̇]; input: their accelerations. Over the horizon the tool's
-error to the goal, velocities and accelerations cost; velocities, joint positions and accelerations are bounded. It
-knows no obstacles. The model's functions are written in Python, so that its time is not comparable with theirs in C++.
+error to the goal, what the arm's manipulability is short of a good one, velocities and accelerations cost; velocities,
+joint positions and accelerations are bounded, as far as one iteration of the solver keeps bounds. Towards the goal
+manipulability gives way to the tool. Weights, horizon and the form of the costs are ours. It knows no obstacles. The
+model's functions are written in Python, so that its time is not comparable with theirs in C++.
 """
 
+import math
 import time
 from typing import Any
 
@@ -19,13 +22,16 @@ from rolling_panda.errors import RollingPandaError
 from rolling_panda.model.differential_drive import NQ, NXI, Array
 from rolling_panda.model.robot import ARM_Q, ARM_XI, RobotModel
 
-#: Knots of the horizon, their distance (s), and iterations of the solver at each of its turns.
-_KNOTS, _STEP, _ITERATIONS = 20, 0.1, 3
+#: Knots of the horizon, their distance (s), iterations of the solver at each of its turns, and of its QP in each.
+_KNOTS, _STEP, _ITERATIONS, _QP_ITERATIONS = 20, 0.1, 1, 200
 #: Time from one turn of the solver to the next (s).
 _TURN = 0.05
 #: Costs of the tool's place and turning at a knot, their factor at the last, and costs of velocities and of
 #: accelerations, each as a share of its limit.
 _PLACE, _TURNING, _LAST, _SPEED, _EFFORT = 100.0, 30.0, 10.0, 1e-2, 1e-2
+#: Cost of what the arm's manipulability is short of a good one, as a share of that one; and the distance of the tool
+#: from its goal (m) below which it costs less, down to nothing at the goal, where it would hold the tool off.
+_MANIPULABILITY, _GOOD_OMEGA, _NEAR = 3.0, 0.15, 0.3
 #: Entries of the state: base pose and arm joints, then ν.
 _POSES, _NX = 10, 10 + NXI
 
@@ -36,8 +42,10 @@ class Predictive:
     name = "mpc"
     flows = True
 
-    def __init__(self, robot: RobotModel, config: WholeBodyConfig, dt: float) -> None:
-        """Build the problem for a control period of `dt` (s).
+    def __init__(
+        self, robot: RobotModel, config: WholeBodyConfig, dt: float, manipulability: float = _MANIPULABILITY
+    ) -> None:
+        """Build the problem for a control period of `dt` (s); `manipulability` is its cost far from the goal.
 
         Raises:
             RollingPandaError: Crocoddyl or mim-solvers is not installed.
@@ -47,17 +55,18 @@ class Predictive:
             import mim_solvers
         except ImportError as error:
             raise RollingPandaError(
-                f"mpc is not installed ({error}); it needs `pip install --no-deps crocoddyl libcrocoddyl mim-solvers "
-                "libmim-solvers`: with its dependencies, Crocoddyl would change the robot's model"
+                f"mpc is not installed ({error}); `make peers` installs it, without its dependencies: with them, "
+                "Crocoddyl would change the robot's model"
             ) from error
         self._dt, self._actuation = dt, Actuation(robot.drive)
         self._manipulability = ArmManipulability()
         self._solver_of = mim_solvers.SolverCSQP
         self._shooting_of = crocoddyl.ShootingProblem
-        self._running = [_model(crocoddyl, RobotModel(), config, last=False) for _ in range(_KNOTS)]
-        self._last = _model(crocoddyl, RobotModel(), config, last=True)
-        self._greatest = self._last.acceleration
-        self._fastest = self._last.velocity
+        #: The action models of the knots, and of the last one.
+        self.running = [_model(crocoddyl, RobotModel(), config, manipulability, last=False) for _ in range(_KNOTS)]
+        self.last = _model(crocoddyl, RobotModel(), config, manipulability, last=True)
+        self._greatest = self.last.acceleration
+        self._fastest = self.last.velocity
         #: Processor time of each of the solver's turns (s).
         self.seconds: list[float] = []
         self._states: list[Array] = []
@@ -66,7 +75,7 @@ class Predictive:
 
     def aim(self, T_odom_goal: Any, free_axis: bool) -> None:
         """Begin a motion to a tool pose (pin.SE3); see `Aimed`."""
-        for model in (*self._running, self._last):
+        for model in (*self.running, self.last):
             model.aim(T_odom_goal, free_axis)
         self._states, self._inputs, self.seconds = [], [], []
         self._since = _TURN
@@ -75,21 +84,25 @@ class Predictive:
         """The actuator velocities of the newest plan; see `Method.solve`. The problem's twist is not used."""
         nu = self._actuation.nu(problem.sent)
         if self._since >= _TURN - 0.5 * self._dt:
-            self._plan(np.concatenate([problem.q[:3], problem.q[ARM_Q], nu]))
+            place = problem.kinematics.T_odom_tool.translation
+            self._plan(np.concatenate([problem.q[:3], problem.q[ARM_Q], nu]), place)
             self._since = 0.0
         self._since += self._dt
         change = np.clip(self._inputs[0], -self._greatest, self._greatest) * self._dt
         xi = self._actuation.xi(np.clip(nu + change, -self._fastest, self._fastest))
         return Solution(xi, 1.0, self._manipulability.at(problem.kinematics.J).value)
 
-    def _plan(self, x: Array) -> None:
+    def _plan(self, x: Array, place: Array) -> None:
         began = time.thread_time()
-        solver = self._solver_of(self._shooting_of(x, self._running, self._last))
+        solver = self._solver_of(self._shooting_of(x, self.running, self.last))
         solver.termination_tolerance = 1e-4
-        solver.max_qp_iters = 50
+        solver.max_qp_iters = _QP_ITERATIONS
         if not self._states:
             self._states, self._inputs = [x.copy() for _ in range(_KNOTS + 1)], [np.zeros(NXI) for _ in range(_KNOTS)]
         self._states[0] = x
+        distance = float(np.linalg.norm(self.last.goal.translation - place))
+        for model in (*self.running, self.last):
+            model.lean(distance)
         solver.solve(self._states, self._inputs, _ITERATIONS)
         found = [np.array(u) for u in solver.us]
         if all(np.isfinite(u).all() for u in found):
@@ -99,23 +112,32 @@ class Predictive:
         self.seconds.append(time.thread_time() - began)
 
 
-def _model(crocoddyl: Any, robot: RobotModel, config: WholeBodyConfig, last: bool) -> Any:
-    """The action model of a knot, of Crocoddyl's type."""
+def _model(crocoddyl: Any, robot: RobotModel, config: WholeBodyConfig, manipulability: float, last: bool) -> Any:
+    """The action model of a knot, of Crocoddyl's type; `manipulability` is what that of the arm costs."""
     limits = robot.limits
     arm_speed = limits.velocity[ARM_XI] * config.arm_velocity_scale
     arm_acceleration = limits.acceleration[ARM_XI] * config.arm_acceleration_scale
     velocity = np.concatenate([[config.base_speed, config.base_yaw_rate], arm_speed])
     acceleration = np.concatenate([[config.base_acceleration, config.base_yaw_acceleration], arm_acceleration])
     bounds = 7 + NXI + (0 if last else NXI)
+    speed_cost, effort_cost = _SPEED / velocity**2, _EFFORT / acceleration**2
+    # What does not depend on the state: second derivatives, and derivatives of joints, velocities and input.
+    Lxx, Luu = np.diag(np.concatenate([np.zeros(_POSES), speed_cost])), np.diag(effort_cost)
+    Gx, Gu = np.zeros((bounds, _NX)), np.zeros((bounds, NXI))
+    Gx[:7, 3:_POSES], Gx[7 : 7 + NXI, _POSES:] = np.eye(7), np.eye(NXI)
+    if not last:
+        Gu[7 + NXI :] = np.eye(NXI)
+    pose_columns = [0, 1, 2, *range(5, NQ)]
+    arm = ArmManipulability()
 
     class Knot(crocoddyl.ActionModelAbstract):  # type: ignore[misc]
         """Integration over one step, costs and bounds."""
 
         def __init__(self) -> None:
             state = crocoddyl.StateVector(_NX)
-            super().__init__(state, 0 if last else NXI, 6, bounds, 0)
+            super().__init__(state, 0 if last else NXI, 7, bounds, 0)
             self.velocity, self.acceleration = velocity, acceleration
-            self.goal, self.free = pin.SE3.Identity(), False
+            self.aim(pin.SE3.Identity(), False)
             lower = [limits.lower[ARM_Q] + config.joint_margin, -velocity]
             upper = [limits.upper[ARM_Q] - config.joint_margin, velocity]
             if not last:
@@ -124,41 +146,50 @@ def _model(crocoddyl: Any, robot: RobotModel, config: WholeBodyConfig, last: boo
             self.g_lb, self.g_ub = np.concatenate(lower), np.concatenate(upper)
 
         def aim(self, T_odom_goal: Any, free_axis: bool) -> None:
-            self.goal, self.free = T_odom_goal, free_axis
+            turning = [_TURNING, 0.0 if free_axis else _TURNING, _TURNING]
+            tool = (_LAST if last else _STEP) * np.array([*[_PLACE] * 3, *turning])
+            self.goal = T_odom_goal
+            self.weights = np.append(tool, 0.0)
+            # The pose that was asked for last, and its residuals.
+            self.seen = np.full(_POSES, np.nan)
+            self.found: tuple[Array, Array] = (np.zeros(7), np.zeros((7, _POSES)))
+
+        def lean(self, distance: float) -> None:
+            """Weigh manipulability for a tool so far from its goal (m)."""
+            self.weights[6] = (1.0 if last else _STEP) * manipulability * min(1.0, distance / _NEAR)
 
         def calc(self, data: Any, x: Array, u: Array | None = None) -> None:
-            weights, r, _ = self._error(x, False)
+            r, _ = self._residuals(x)
             nu = x[_POSES:]
-            data.cost = 0.5 * float(weights @ r**2) + 0.5 * _SPEED * float(((nu / velocity) ** 2).sum())
+            data.cost = 0.5 * float(self.weights @ (r * r) + speed_cost @ (nu * nu))
             if u is None or last:
                 data.xnext = x
-                data.g = np.concatenate([x[3:_POSES], nu])
+                data.g = x[3:]
                 return
-            data.cost += 0.5 * _EFFORT * float(((u / acceleration) ** 2).sum())
+            data.cost += 0.5 * float(effort_cost @ (u * u))
             after = nu + _STEP * u
             # The pose of the base in the middle of the step has the direction of its chord.
-            heading = x[2] + 0.5 * _STEP * after[1]
-            moved = _STEP * np.concatenate([[after[0] * np.cos(heading), after[0] * np.sin(heading)], after[1:]])
-            data.xnext = np.concatenate([x[:_POSES] + moved, after])
-            data.g = np.concatenate([x[3:_POSES], nu, u])
+            heading, v = x[2] + 0.5 * _STEP * after[1], after[0]
+            xnext = np.concatenate([x[:_POSES], after])
+            xnext[0] += _STEP * v * math.cos(heading)
+            xnext[1] += _STEP * v * math.sin(heading)
+            xnext[2:_POSES] += _STEP * after[1:]
+            data.xnext = xnext
+            data.g = np.concatenate([x[3:], u])
 
         def calcDiff(self, data: Any, x: Array, u: Array | None = None) -> None:
-            weights, r, J = self._error(x, True)
+            r, J = self._residuals(x)
             nu = x[_POSES:]
-            Lx, Lxx = np.zeros(_NX), np.zeros((_NX, _NX))
-            weighted = J.T * weights
-            Lx[:_POSES], Lxx[:_POSES, :_POSES] = weighted @ r, weighted @ J
-            Lx[_POSES:] = _SPEED * nu / velocity**2
-            Lxx[range(_POSES, _NX), range(_POSES, _NX)] = _SPEED / velocity**2
-            data.Lx, data.Lxx = Lx, Lxx
-            Gx = np.zeros((bounds, _NX))
-            Gx[:7, 3:_POSES], Gx[7 : 7 + NXI, _POSES:] = np.eye(7), np.eye(NXI)
+            weighted = J.T * self.weights
+            second = Lxx.copy()
+            second[:_POSES, :_POSES] = weighted @ J
+            data.Lx, data.Lxx = np.concatenate([weighted @ r, speed_cost * nu]), second
             data.Gx = Gx
             if u is None or last:
                 return
             after = nu + _STEP * u
             heading = x[2] + 0.5 * _STEP * after[1]
-            c, s, v = np.cos(heading), np.sin(heading), after[0]
+            c, s, v = math.cos(heading), math.sin(heading), after[0]
             # The next pose over the heading now, and over ν after the step.
             over = np.zeros((_POSES, NXI))
             over[0, :2] = c, -0.5 * _STEP * v * s
@@ -169,27 +200,26 @@ def _model(crocoddyl: Any, robot: RobotModel, config: WholeBodyConfig, last: boo
             Fx[:_POSES, _POSES:] = _STEP * over
             Fu[:_POSES], Fu[_POSES:] = _STEP**2 * over, _STEP * np.eye(NXI)
             data.Fx, data.Fu = Fx, Fu
-            data.Lu = _EFFORT * u / acceleration**2
-            data.Luu = np.diag(_EFFORT / acceleration**2)
-            Gu = np.zeros((bounds, NXI))
-            Gu[7 + NXI :] = np.eye(NXI)
-            data.Gu = Gu
+            data.Lu, data.Luu, data.Gu = effort_cost * u, Luu, Gu
 
-        def _error(self, x: Array, derive: bool) -> tuple[Array, Array, Array]:
-            """Weights (6), the tool's error (6) in its own frame, and its derivative over base pose and arm (6×10)."""
+        def _residuals(self, x: Array) -> tuple[Array, Array]:
+            """The residuals (7) and their derivatives over base pose and arm (7×10).
+
+            Six are the tool's error in its own frame. The last is what the arm's manipulability is short of a good one,
+            1 − ω/ω_good, whose derivative is exact. The solver asks for each state several times in a row.
+            """
+            if np.array_equal(x[:_POSES], self.seen):
+                return self.found
             q = np.zeros(NQ)
             q[:3], q[ARM_Q] = x[:3], x[3:_POSES]
-            weights = np.array([_PLACE] * 3 + [_TURNING] * 3) * (_LAST if last else _STEP)
-            if self.free:
-                weights[4] = 0.0
-            if not derive:
-                T = self.goal.actInv(robot.pose(q, robot.tool_id))
-                return weights, pin.log6(T).vector, np.empty((0, 0))
             pin.computeJointJacobians(robot.model, robot.data, q)
-            pin.updateFramePlacements(robot.model, robot.data)
-            T = self.goal.actInv(robot.data.oMf[robot.tool_id])
+            T = self.goal.actInv(pin.updateFramePlacement(robot.model, robot.data, robot.tool_id))
             J = pin.getFrameJacobian(robot.model, robot.data, robot.tool_id, pin.LOCAL)
-            columns = [0, 1, 2, *range(5, NQ)]
-            return weights, pin.log6(T).vector, pin.Jlog6(T) @ J[:, columns]
+            omega = arm.at(J)
+            r, over = np.empty(7), np.zeros((7, _POSES))
+            r[:6], r[6] = pin.log6(T).vector, 1.0 - omega.value / _GOOD_OMEGA
+            over[:6], over[6, 3:] = pin.Jlog6(T) @ J[:, pose_columns], omega.gradient[ARM_XI] / -_GOOD_OMEGA
+            self.seen, self.found = x[:_POSES].copy(), (r, over)
+            return self.found
 
     return Knot()

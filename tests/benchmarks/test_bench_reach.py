@@ -220,7 +220,7 @@ def test_a_peer_that_is_not_installed_is_refused_with_how_to_get_it(monkeypatch,
     assert "mink is not installed" in (error := capsys.readouterr().err) and "make peers" in error
     monkeypatch.setitem(sys.modules, "crocoddyl", None)
     assert main(["reach", "--count", "1", "--jobs", "1", "--method", "mpc"]) == 1
-    assert "pip install --no-deps crocoddyl" in capsys.readouterr().err
+    assert "mpc is not installed" in (error := capsys.readouterr().err) and "make peers" in error
 
 
 @pytest.mark.long
@@ -241,6 +241,39 @@ def test_methods_are_judged_beside_each_other_on_the_same_goals(tmp_path, capsys
 
 
 @pytest.mark.long
+@pytest.mark.long
+def test_kinds_of_goals_are_taken_in_turn_until_the_time_is_over_with_the_same_goals_for_all(tmp_path, capsys):
+    path = tmp_path / "reach.json"
+    words = ["--count", "3", "--seed", "41", "--goals", "row", "axis_free", "--method", "nullspace", "hierarchy"]
+    assert reach.main([*words, "--minutes", "0", "--json", str(path)]) == 0
+    documents = json.loads(path.read_text())["methods"]
+    assert [(document["kind"], document["method"]) for document in documents] == [
+        ("row", "nullspace"),
+        ("row", "hierarchy"),
+        ("axis_free", "nullspace"),
+        ("axis_free", "hierarchy"),
+    ]
+    # No time at all is one goal each, the first one.
+    assert [[row["target"] for row in document["results"]] for document in documents] == [[0]] * 4
+    distances = [document["results"][0]["distance"] for document in documents]
+    assert distances[0] == distances[1] != distances[2] == distances[3]
+    assert documents[2]["targets"] == "drawn: seed 41, free axis tool_y, goals anywhere"
+    shown = capsys.readouterr().out
+    assert "row " in shown and "axis_free" in shown
+
+
+def test_a_time_for_goals_of_a_file_is_refused(tmp_path, capsys):
+    assert main(["reach", "--minutes", "9", "--targets", str(tmp_path / "none.json")]) == 1
+    assert "--minutes is for drawn goals" in capsys.readouterr().err
+
+
+@pytest.mark.long
+def test_a_motion_that_is_stuck_ends_before_the_time_is_over():
+    target = reach_targets.draw(41, 1, "none", goals="anywhere")[0]
+    (row,) = reach.run([target], "nullspace", 0, 1)
+    assert not row.quality.reached and 3.0 < row.quality.duration < 15.0
+
+
 def test_the_command_prints_a_table_and_writes_every_figure(tmp_path, capsys):
     path = tmp_path / "folder" / "reach.json"
     assert reach.main(["--count", "2", "--seed", "21", "--jobs", "2", "--json", str(path)]) == 0

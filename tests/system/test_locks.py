@@ -41,6 +41,7 @@ def test_every_declared_dependency_is_locked_at_an_allowed_version(lock: str, de
         "requirements-real.lock",
         "requirements-training.lock",
         "requirements-peers.lock",
+        "requirements-mpc.lock",
         "requirements-docs.lock",
         "requirements.lock",
     ],
@@ -49,6 +50,13 @@ def test_a_lock_has_hashes_and_no_index_address(lock: str) -> None:
     text = (ROOT / lock).read_text()
     assert text.count("--hash=sha256:") >= len(re.findall(r"^\S+==", text, re.MULTILINE))
     assert "://" not in text
+
+
+def test_what_is_installed_without_its_dependencies_is_locked_at_the_version_that_is_named() -> None:
+    named = re.findall(r"^MPC := (.+)$", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    pinned = re.findall(r"^[A-Za-z0-9_.-]+==[^\s\\]+", (ROOT / "requirements-mpc.lock").read_text(), re.MULTILINE)
+    assert named == [" ".join(pinned)]
+    assert "--no-deps --require-hashes -r requirements-mpc.lock" in (ROOT / "Makefile").read_text()
 
 
 @pytest.mark.parametrize("file", ["Makefile", "Dockerfile", "docs/deployment.md"])
