@@ -7,7 +7,6 @@ manipulability gives way to the tool. Weights, horizon and the form of the costs
 model's functions are written in Python, so that its time is not comparable with theirs in C++.
 """
 
-import math
 import time
 from typing import Any
 
@@ -171,8 +170,8 @@ def _model(crocoddyl: Any, robot: RobotModel, config: WholeBodyConfig, manipulab
             # The pose of the base in the middle of the step has the direction of its chord.
             heading, v = x[2] + 0.5 * _STEP * after[1], after[0]
             xnext = np.concatenate([x[:_POSES], after])
-            xnext[0] += _STEP * v * math.cos(heading)
-            xnext[1] += _STEP * v * math.sin(heading)
+            xnext[0] += _STEP * v * np.cos(heading)
+            xnext[1] += _STEP * v * np.sin(heading)
             xnext[2:_POSES] += _STEP * after[1:]
             data.xnext = xnext
             data.g = np.concatenate([x[3:], u])
@@ -189,7 +188,7 @@ def _model(crocoddyl: Any, robot: RobotModel, config: WholeBodyConfig, manipulab
                 return
             after = nu + _STEP * u
             heading = x[2] + 0.5 * _STEP * after[1]
-            c, s, v = math.cos(heading), math.sin(heading), after[0]
+            c, s, v = np.cos(heading), np.sin(heading), after[0]
             # The next pose over the heading now, and over ν after the step.
             over = np.zeros((_POSES, NXI))
             over[0, :2] = c, -0.5 * _STEP * v * s
