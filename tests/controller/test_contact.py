@@ -327,7 +327,7 @@ def test_what_still_pushes_ends_the_way_back_and_after_a_look_the_robot_can_be_l
     assert r.state.mode == "TELEOP", r.state.reason
 
 
-@pytest.mark.parametrize("ends", [0, 25])
+@pytest.mark.parametrize("ends", [0, 35])
 def test_a_contact_that_eases_is_gone_back_from_and_one_that_no_longer_does_ends_the_way_back(ends):
     r = led()
     r.external_torque = (60.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
