@@ -136,9 +136,10 @@ def test_a_wire_is_met_by_the_arm() -> None:
 def test_the_trace_has_the_force_of_a_touch_also_of_a_cane_that_bends(
     tmp_path: Path, kind: Literal["wire", "cane"], contacts: bool
 ) -> None:
-    # A cane gives way to what is in it from the beginning.
-    height, ahead = robot().true_tool()[2, 3] - 0.1, robot().true_tool()[1, 3] + (0.05 if kind == "cane" else -0.1)
-    ends = np.array([-0.4, ahead, height]), np.array([0.4, ahead, height])
+    tool = robot().true_tool()[:3, 3]
+    # The tool comes through the cane; it begins clear of it, as a cane gives way to what is in it from the beginning.
+    middle = tool + [0.05, -0.015, -0.15] if kind == "cane" else np.array([0.0, tool[1] - 0.1, tool[2] - 0.1])
+    ends = middle - [0.4, 0.0, 0.0], middle + [0.4, 0.0, 0.0]
     rod = Rod(kind, *ends, 0.004, 0.004, vine=1, spur=2, cane=0) if kind == "cane" else Rod(kind, *ends, 0.004, 0.004)
     trace, world = TraceWriter(tmp_path / "t"), only(("cane_modulus",), "field")
     sim = SimulatedRobot(CONFIG, Row((rod,)), Blind(), trace, world)
