@@ -78,6 +78,18 @@ def a_whole_job(page: Page, server: PlayedServer) -> None:
     page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
 
+def test_a_link_that_becomes_slow_moves_nothing_beside_it(page: Page) -> None:
+    widths = page.evaluate("""() => {
+        const link = document.querySelector("#link"), number = link.querySelector(".number");
+        return [["5 ms", "good"], ["234 ms", "poor"], ["2345 ms", "bad"]].map(([text, quality]) => {
+            number.textContent = text;
+            link.dataset.quality = quality;
+            return document.querySelector("rp-vines").getBoundingClientRect().width;
+        });
+    }""")
+    assert len(set(widths)) == 1, widths
+
+
 def test_what_is_accepted_who_comes_and_a_whole_job_move_nothing_on_the_page(page: Page, server: PlayedServer) -> None:
     """Neither a panel nor a button nor a row of the queue is elsewhere, so that no press meets another one."""
     parts = ("#stop", "#mode", "rp-vines", "main > .screen", ".stage", ".stage > *", "rp-bar", ".next", "[data-cut]")
