@@ -89,6 +89,7 @@ def flawed_rig(request: pytest.FixtureRequest) -> Iterator[Callable[[float], Rig
 
     def start(offset: float) -> Rig:
         rigs.append(Rig(factory(True, offset)))
+        rigs[-1].plant.stream()
         return rigs[-1]
 
     yield start
@@ -224,6 +225,7 @@ def near(rig: Rig) -> tuple[float, float]:
 
 @pytest.mark.long
 def test_a_picture_tells_when_it_was_exposed_and_where_the_base_was_then(rig: Rig) -> None:
+    rig.plant.stream()
     rig.run(0.3, REST)
     late, off = late_pictures(rig)
     time_s, way = near(rig)

@@ -42,6 +42,8 @@ class Plant(Protocol):
 
     def heading(self) -> float: ...  # by how much the base has turned since the start (rad, not wrapped)
 
+    def stream(self) -> None: ...  # pictures and inertial samples tell of motion from now on
+
     def exposed_at(self, frame: CameraFrame) -> float: ...  # when its picture was really exposed (s, the robot's time)
 
 
@@ -266,6 +268,9 @@ class SimulatedPlant:
 
     def bites(self) -> int:
         return self._bites
+
+    def stream(self) -> None:
+        """They always do."""
 
     def heading(self) -> float:
         return float(self.robot.true_base().pose[2])

@@ -26,7 +26,7 @@ from rolling_panda.messages.robot import CameraFrame, Intrinsics
 from rolling_panda.model.differential_drive import NXI, Array
 from rolling_panda.model.robot import ARM_Q, RobotModel
 from rolling_panda.transport.zenoh import ForeignWire
-from tests.support.bridge_rig import MODEL, NUMBER_M, number_of
+from tests.support.bridge_rig import MODEL, NUMBER_M, PICTURE, number_of
 from tests.support.processes.device_process import DeviceProcess
 from tests.support.processes.local_router import local_router
 
@@ -43,12 +43,12 @@ _LENS = Intrinsics(32, 24, 20.0, 20.0, 16.0, 12.0)
 class FakeCamera:
     """The camera's driver on librealsense's software device, which streams pictures and inertial samples.
 
-    Its pictures show their number. It feels how arm and base turn it. The base may turn by less than its wheels tell,
-    since it slides.
+    Once it streams its pictures show their number, and it feels how arm and base turn it. The base may turn by less
+    than its wheels tell, since it slides. Before, it has one picture for all, is upright and at rest, and costs little.
     """
 
     def __init__(self, base: Mp500, arm: Panda, late_s: float, slides: float) -> None:
-        """Be silent until `start`.
+        """Do not stream yet.
 
         Args:
             base: Which the camera rides on.
@@ -59,29 +59,43 @@ class FakeCamera:
         self._base, self._arm, self._late_s, self._turns = base, arm, late_s, 1.0 - slides
         self._model = RobotModel()
         self._device, self._motion = SoftwareDevice(_LENS, _RATE_HZ, NUMBER_M), SoftwareMotion()
-        self._driver = RealSense(self._device, rs.align(rs.stream.color), self._motion)
+        self._driver: RealSense | None = None
         #: When each was exposed (s, monotonic), number 1 first.
         self.exposures: list[float] = []
         #: By how much the base has turned (rad).
         self.heading = 0.0
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._run, name="fake camera")
+        self._ready: Picture | None = None
+        self._felt_at = 0.0
 
-    def start(self) -> None:
-        """Stream; base and arm have to tell where they are."""
+    def stream(self) -> None:
+        """Stream from now on; base and arm have to tell where they are."""
+        self._driver = RealSense(self._device, rs.align(rs.stream.color), self._motion)
         self._thread.start()
 
     def inertial(self) -> Inertial | None:
-        return self._driver.inertial()
+        if self._driver is not None:
+            return self._driver.inertial()
+        if (now := time.monotonic()) - self._felt_at > _SAMPLE_S:
+            self._felt_at = now
+            self._motion.feel(Inertial(now, np.zeros(3), np.array([0.0, -GRAVITY, 0.0])))
+        return self._motion.newest()
 
     def capture(self, expose: bool) -> Picture | None:
-        return self._driver.capture(expose)
+        if self._driver is not None:
+            return self._driver.capture(expose)
+        ready, self._ready = self._ready, PICTURE if expose else None
+        return ready
 
     def close(self) -> None:
         self._closing.set()
         if self._thread.is_alive():
             self._thread.join()
-        self._driver.close()
+        if self._driver is None:
+            self._motion.close()
+        else:
+            self._driver.close()
 
     def _run(self) -> None:
         last, before = time.monotonic(), self._rotation()
@@ -155,7 +169,6 @@ class RealPlant(Devices):
         while self.robot.read().fault or blades.read().state != "open":
             assert time.monotonic() < end, self.robot.read().fault
             time.sleep(0.02)
-        self.camera.start()
         odometer = Odometer(MODEL.drive, OdometryConfig(), TICK_S, 0, BaseOrientation(RobotModel()))
         return BridgeCore(self.robot, config, MODEL.limits, odometer, "real")
 
@@ -167,6 +180,9 @@ class RealPlant(Devices):
 
     def bites(self) -> int:
         return int(self.base.tell_all("report")["cutter"]["bites"])
+
+    def stream(self) -> None:
+        self.camera.stream()
 
     def heading(self) -> float:
         return self.camera.heading
