@@ -146,6 +146,7 @@ def test_how_the_base_stands_is_told_with_the_odometry_and_each_picture(rig: Rig
         assert (attitude.height, attitude.roll, attitude.pitch) == pytest.approx((0.0, 0.0, 0.0), abs=2e-3)
 
 
+@pytest.mark.alone  # What is beside it delays samples and pictures.
 @pytest.mark.long
 def test_the_heading_is_that_of_the_gyroscope_where_the_base_turns_otherwise_than_its_wheels(
     flawed_rig: Callable[[float], Rig],
@@ -223,6 +224,7 @@ def near(rig: Rig) -> tuple[float, float]:
     return (0.04, 0.02) if rig.parts.real else (0.006, 0.004)
 
 
+@pytest.mark.alone  # What is beside it delays samples and pictures.
 @pytest.mark.long
 def test_a_picture_tells_when_it_was_exposed_and_where_the_base_was_then(rig: Rig) -> None:
     rig.plant.stream()
@@ -232,6 +234,7 @@ def test_a_picture_tells_when_it_was_exposed_and_where_the_base_was_then(rig: Ri
     assert abs(late) < time_s and off < way
 
 
+@pytest.mark.alone  # What is beside it delays samples and pictures.
 @pytest.mark.long
 def test_a_late_picture_tells_when_it_was_exposed_once_the_delay_is_calibrated(
     flawed_rig: Callable[[float], Rig],
@@ -249,6 +252,7 @@ def test_a_late_picture_tells_when_it_was_exposed_once_the_delay_is_calibrated(
     assert abs(late) < time_s and off < way
 
 
+@pytest.mark.alone  # What is beside it delays samples and pictures.
 @pytest.mark.long
 def test_a_late_picture_tells_when_it_was_exposed_where_the_offset_is_configured(
     flawed_rig: Callable[[float], Rig],
