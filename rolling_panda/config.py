@@ -6,6 +6,7 @@ are here. An unknown key is an error that names the nearest known one.
 
 import difflib
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -129,9 +130,19 @@ def load_section(path: Path, name: str, kind: type[Section]) -> Section:
         raise ConfigError(f"{path}: [{name}]: {error}") from error
 
 
-def section_keys(path: Path, name: str) -> tuple[str, ...]:
-    """The keys that a configuration file gives of a section, which `load_section` has checked."""
-    return tuple(_read(path).get(name, {}))
+def load_preset(path: Path, name: str, presets: Mapping[str, Section]) -> Section:
+    """One section of a configuration file whose key `preset` names the values of all keys that are not given.
+
+    Args:
+        path: TOML file.
+        name: Section, one of `SECTIONS`.
+        presets: By name; at least one.
+
+    Raises:
+        ConfigError: As of `load_section`.
+    """
+    given = msgspec.structs.asdict(load_section(path, name, type(next(iter(presets.values())))))
+    return msgspec.structs.replace(presets[given["preset"]], **{key: given[key] for key in _read(path).get(name, {})})
 
 
 def _read(path: Path) -> dict[str, Any]:

@@ -15,6 +15,7 @@ import numpy as np
 
 from benchmarks.common.documents import bench_parser, write
 from benchmarks.common.intervals import Figure, quantile, share
+from benchmarks.control.stops import TOUCH_N
 from bridge.sim.vineyard.row import Rod
 from bridge.sim.world.config import PRESETS, only
 from controller.config import ControllerConfig
@@ -49,8 +50,6 @@ _AFTER_S, _BACK_S, _END_S = 2.6, 8.0, 0.5
 AT_REST = 0.01
 #: Time until an obstacle must have been met (s), and draws of a posture.
 _LIMIT_S, _DRAWS = 8.0, 400
-#: Forces below this are no contact (N).
-_NOTHING = 0.5
 
 
 @dataclass(frozen=True)
@@ -184,7 +183,7 @@ def run_trial(scene: Scene, trial: Trial, seed: int) -> Trial:
     began = touches[0][0]
     stopped = next((at for at, mode in loop.modes if mode == "PROTECTIVE_STOP" and at >= began), None)
     standing = Standing() if stopped is None else standing_after(loop.stopped, stopped)
-    # What touches it on the way back is told by what is left.
+    # Forces on the way back are not counted here: `left_n` tells what is left after it.
     hardest = max((each for each in touches if each[0] <= standing.until), key=lambda each: each[1])
     told = loop.touch
     values = {} if told is None else dict(told.values)
@@ -252,7 +251,7 @@ def _way_back(loop: ContactWorld) -> bool | None:
 
 
 def _hard(loop: ContactWorld) -> list[tuple[float, float, str]]:
-    return [each for each in loop.touches if each[1] > _NOTHING]
+    return [each for each in loop.touches if each[1] > TOUCH_N]
 
 
 def _joint(name: str) -> int:

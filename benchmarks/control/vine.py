@@ -517,7 +517,7 @@ def prune_vine(
         path, length, world, settings = Path(folder) / "trace", VineyardConfig().vine_spacing, PRESETS[preset], {}
         if preset != "calm":
             world, settings = calibrated(world), _in_the_field(world)
-        settings |= _one_vine(training, length, cultivar)
+        settings |= one_vine(training, length, cultivar)
         config = sim_config(Path(folder) / "vine.toml", pictures, world, settings)
         with ClosedLoop(seed, path, config, "hierarchy", watch, segmenter=segmenter) as loop:
             before = row_of(loop)
@@ -568,7 +568,7 @@ def _in_the_field(world: WorldConfig) -> dict[str, dict[str, object]]:
     }
 
 
-def _one_vine(training: Training, length: float, cultivar: str) -> dict[str, dict[str, object]]:
+def one_vine(training: Training, length: float, cultivar: str) -> dict[str, dict[str, object]]:
     """Settings of a row of one vine, whose edge is in the middle of the first picture."""
     row: dict[str, object] = {"preset": cultivar, "vines": 1, "first_vine_x": _CAMERA_AHEAD + length / 2}
     if training == "spur":
@@ -593,7 +593,7 @@ def places(
         reviewer: With every point that was proposed, and the accepted ones.
         ends: Entries of the queue at the end.
         sites: Undecided sites at the end of the visit, followed by those that the reviewer left. The last site of a
-            spur gives its reason; what is told of last year's cane is that cane's reason alone.
+            spur gives its reason. A site that is left for last year's cane gives the reason of that cane only.
     """
     asked = [(each, each.cut) for each in wanted if each.cut is not None]
     pieces = [piece for bite in bites for piece in bite["severed"]]

@@ -158,8 +158,8 @@ def _taken_at(frame: Any) -> float | None:
 def _unix_ahead() -> float:
     """By how much the Unix time is ahead of the monotonic clock (s).
 
-    A thread can be held up between two readings. Of a few pairs the narrowest counts, between whose monotonic readings
-    that of the Unix time lies: the error is at most half of what is between them.
+    The Unix time is read between two readings of the monotonic clock. A thread can be held up between readings, so the
+    nearest two of a few pairs count. The error is at most half of their distance.
     """
     narrowest, ahead = math.inf, 0.0
     for _ in range(_READINGS):

@@ -424,7 +424,7 @@ def test_a_file_from_before_there_were_cultivars_has_vines_of_the_usual_one(tmp_
 
 
 def test_a_cultivar_is_the_preset_of_the_vineyard_that_the_robot_stands_in(tmp_path: Path):
-    settings = bench._one_vine("guyot", 1.8, "drooping")
+    settings = bench.one_vine("guyot", 1.8, "drooping")
     got = load_vineyard(bench.sim_config(tmp_path / "vine.toml", 2.0, bench.PRESETS["calm"], settings))
     assert (got.preset, got.training, got.vines) == ("drooping", "guyot", 1)
     assert got.cane_droop == bench.CULTIVARS["drooping"].cane_droop != VineyardConfig().cane_droop

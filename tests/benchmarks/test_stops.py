@@ -5,6 +5,7 @@ import pytest
 
 from benchmarks.control.stops import Stop, stops_of
 from bridge.sim.robot import trace
+from bridge.sim.robot.touch import ExternalTorque
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from tests.support.worlds.contact_world import ContactWorld
@@ -50,16 +51,21 @@ def test_each_protective_stop_is_judged_by_its_own_time_and_no_other_halt_is_one
     )
 
 
+def wrong(felt: ExternalTorque, *_: object) -> None:
+    """An estimate of 20 N·m at joint 2, whatever acts there."""
+    felt.value = np.array([0.0, 20.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("touches", [True, False])
-def test_of_a_robot_the_stop_at_a_post_is_true_and_one_by_a_wrong_estimate_is_false(tmp_path, touches):
+def test_of_a_robot_the_stop_at_a_post_is_true_and_one_by_a_wrong_estimate_is_false(tmp_path, monkeypatch, touches):
     post, _ = in_the_way("post", "cutter", TURN, UP, 0.04)
     writer = trace.TraceWriter(tmp_path / "t")
     loop = ContactWorld((post,) if touches else (), trace=writer)
     loop.hold(joints=scaled(TURN, "cutter", 0.2))
     loop.run(0.3)
     if not touches:
-        loop.robot._felt._offset[1] += 20.0
+        monkeypatch.setattr(ExternalTorque, "step", wrong)
     assert loop.run_until(lambda: loop.touch is not None, 3.0)
     loop.robot.close()
     (stop,) = stops_of(loop.log, trace.read(tmp_path / "t").rows)

@@ -4,9 +4,8 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
-from msgspec.structs import asdict, replace
 
-from rolling_panda.config import Positive, load_section, section_keys
+from rolling_panda.config import Positive, load_preset
 from rolling_panda.errors import ConfigError
 
 Share = Annotated[float, Meta(ge=0.0, le=1.0)]
@@ -171,6 +170,4 @@ def load_vineyard(path: Path) -> VineyardConfig:
     Raises:
         ConfigError: As of `load_section`.
     """
-    given = load_section(path, "vineyard", VineyardConfig)
-    values = asdict(given)
-    return replace(PRESETS[given.preset], **{key: values[key] for key in section_keys(path, "vineyard")})
+    return load_preset(path, "vineyard", PRESETS)

@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
-from msgspec.structs import asdict, replace
+from msgspec.structs import replace
 
-from rolling_panda.config import load_section, section_keys
+from rolling_panda.config import load_preset
 
 Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 Angle = Annotated[float, Meta(ge=0.0, le=0.1)]
@@ -160,9 +160,7 @@ def load_world(path: Path) -> WorldConfig:
     Raises:
         ConfigError: As of `load_section`.
     """
-    given = load_section(path, "world", WorldConfig)
-    values = asdict(given)
-    return replace(PRESETS[given.preset], **{key: values[key] for key in section_keys(path, "world")})
+    return load_preset(path, "world", PRESETS)
 
 
 def only(knobs: tuple[str, ...], preset: str) -> WorldConfig:

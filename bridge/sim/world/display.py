@@ -102,7 +102,7 @@ class RowMotion:
         return tuple(MovedCapsule(place, tuple(start), tuple(end)) for place, (start, end) in pairs)
 
     def _look(self, row: Row, tool: Array, bent: Collection[_Cane]) -> None:
-        """Choose what is told: the rods that swing on canes near the tool, and all of bent canes."""
+        """Choose the rods that are told: those that swing on canes near the tool, and all rods of bent canes."""
         self._revision, self._looked, self._bent = row.revision, tool.copy(), set(bent)
         near = np.flatnonzero(np.abs(self._starts - tool)[:, 0] < _NEAR)
         close = {self._owners[index] for index in near.tolist()}

@@ -11,7 +11,7 @@ from bridge.sim.vineyard.row import Array, Rod, Row
 #: Height along a cane at which its amplitude is the one configured (m), and the frequencies (Hz).
 _AT, _FREQUENCIES = 0.3, (0.5, 2.0)
 Lengths = TypeVar("Lengths", float, Array)
-#: Shares of both ends, frequency and phase of what stands still.
+#: Reach of a rod that stands still: shares of the amplitude at its ends, frequency (Hz), phase (rad).
 _STILL = (0.0, 0.0, 0.0, 0.0)
 
 
