@@ -30,8 +30,12 @@ def arm_and_accept(page: Page, *places: int) -> list[str]:
 
 
 def start(page: Page, robot: LiveRobot, condition: Callable[[], object], what: str) -> None:
-    """Start the work and wait for `condition()`, with nobody there to help should it stop by itself."""
-    page.click("#start")
+    """Start the work and wait for `condition()`, with nobody there to help should it stop by itself.
+
+    The mouse stays where it is: a browser that draws in software takes seconds to move it.
+    """
+    page.wait_for_selector('#start[aria-disabled="false"]')
+    page.dispatch_event("#start", "click")
     robot.wait(lambda: robot.mode() == "AUTO", 10, "the work to start")
 
     def met() -> bool:
@@ -67,11 +71,14 @@ class Press:
             self.selector,
         )
 
-    def press(self) -> float:
-        """Press; when that was, on the machine's monotonic clock (s)."""
+    def reach(self) -> None:
+        """Bring the mouse to the button."""
         box = self.page.locator(self.selector).bounding_box()
         assert box is not None
         self.page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+
+    def press(self) -> float:
+        """Press where the mouse is; when that was, on the machine's monotonic clock (s)."""
         before = time.monotonic()
         self.page.mouse.down()
         after = time.monotonic()
@@ -87,6 +94,7 @@ def stop_in_mid_approach(page: Page, robot: LiveRobot, stop: Press) -> float | N
 
     None where the base had arrived before the press: the browser's mouse may come late to it.
     """
+    stop.reach()
     start(page, robot, robot.driving, "the base to drive")
     pressed = stop.press()
     page.wait_for_selector('#mode[data-mode="ESTOP_LATCHED"]', timeout=20_000)
