@@ -62,7 +62,7 @@ _OF_POINT = 0.06
 #: Periods between two looks at what touches a cane.
 _LOOK_EVERY = 4
 #: Controllers of others that can work off a row.
-_PEERS = ("pink", "mink")
+PEERS = ("pink", "mink")
 
 
 def cut_row(
@@ -355,6 +355,11 @@ def _work(loop: ClosedLoop, todo: list[str], person: Supervisor | None) -> dict[
     return durations
 
 
+def use_peers(methods: Collection[str]) -> None:
+    """Let the controller use those of others' controllers that are among the methods."""
+    METHODS.update({name: in_rows(name) for name in PEERS if name in methods})
+
+
 def main(argv: Sequence[str]) -> int:
     """Run the benchmark; returns the exit code."""
     parser = bench_parser("row", __doc__)
@@ -364,7 +369,7 @@ def main(argv: Sequence[str]) -> int:
     parser.add_argument(
         "--method",
         action="append",
-        choices=(*METHODS, *_PEERS),
+        choices=(*METHODS, *PEERS),
         help="whole-body method; may be given several times (default: ours; the peers need `make peers`)",
     )
     parser.add_argument(
@@ -385,7 +390,7 @@ def main(argv: Sequence[str]) -> int:
     parser.add_argument("--plot", type=Path, metavar="FILE", help="draw the time of a cut by method and stage (PNG)")
     arguments = parser.parse_args(argv)
     methods = arguments.method or list(METHODS)
-    METHODS.update({name: in_rows(name) for name in _PEERS if name in methods})
+    use_peers(methods)
     runs: list[RowRun] = []
     print(f"{'method':<10} {'seed':>4} {'accepted':>8} {'right':>6} {'s a cut':>8} {'contacts':>8} {'× real time':>11}")
     for seed in range(arguments.seed, arguments.seed + arguments.count):

@@ -22,7 +22,7 @@ from benchmarks.common.documents import bench_parser, write
 from benchmarks.common.intervals import Figure, quantile, share
 from benchmarks.control.cane_touches import CaneTouches
 from benchmarks.control.cut_truth import OLD_CANE, WantedCut, true_cut, wanted_cuts
-from benchmarks.control.row import check_camera, codes, judged_cuts, named, row_of, sim_config
+from benchmarks.control.row import PEERS, check_camera, codes, judged_cuts, named, row_of, sim_config, use_peers
 from benchmarks.control.row_report import Cut
 from benchmarks.control.row_stages import STAGES, StageClock
 from benchmarks.control.row_supervisor import GONE_S, LOOK_S
@@ -39,6 +39,7 @@ from bridge.sim.vineyard.truth import staying_rods
 from bridge.sim.world.config import PRESETS, WorldConfig
 from controller.config import ControllerConfig
 from controller.motion.follower import Tracking
+from controller.whole_body.registry import METHODS
 from perception.segmentation.segmenter import SEGMENTERS
 from rolling_panda import commands as intents
 from rolling_panda import messages as m
@@ -85,6 +86,8 @@ _SPUR_NEAR = 0.10
 _LOOK_EVERY = 4
 #: Vines whose growth conditions do not name.
 USUAL = "standard"
+#: Whole-body method of the robot.
+OURS = "hierarchy"
 #: Code of the reason that is told of last year's cane.
 _OLD_CANE_LEFT = old_cane_left().code
 #: Wood this near to a point, this far past the cut, still stands (m).
@@ -111,10 +114,11 @@ class Place:
     reason: str
 
 
-def condition(training: str, cultivar: str, preset: str, review: str, decision_s: float) -> str:
+def condition(training: str, cultivar: str, preset: str, review: str, decision_s: float, method: str = OURS) -> str:
     """The words for the vines of one condition."""
     vine = training if cultivar == USUAL else f"{training}, {cultivar}"
-    return f"{vine}, {preset}, {review} {decision_s:g} s"
+    robot = "" if method == OURS else f"{method}: "
+    return f"{robot}{vine}, {preset}, {review} {decision_s:g} s"
 
 
 @dataclass(frozen=True)
@@ -143,6 +147,7 @@ class VineRun:
         stops: Protective stops after which a person let the work go on.
         cultivar: How the vine grows: a preset of the vineyard.
         false_stops: Protective stops at which the robot touched nothing, by the truth.
+        method: Whole-body method.
     """
 
     seed: int
@@ -166,16 +171,18 @@ class VineRun:
     stops: int = 0
     cultivar: str = USUAL
     false_stops: int = 0
+    method: str = OURS
 
     @property
     def key(self) -> tuple[object, ...]:
         """What tells it from other runs."""
-        return self.training, self.preset, self.review, self.decision_s, self.glance_s, self.cultivar, self.seed
+        grown = self.training, self.preset, self.cultivar, self.seed
+        return *grown, self.review, self.decision_s, self.glance_s, self.method
 
     @property
     def condition(self) -> str:
         """In words what it shares with the other vines of its figures."""
-        return condition(self.training, self.cultivar, self.preset, self.review, self.decision_s)
+        return condition(self.training, self.cultivar, self.preset, self.review, self.decision_s, self.method)
 
     def as_the_rule_says(self, with_room: bool = False) -> bool:
         """Whether every cut that the vine asks for was made where it is right, and nothing that stays was cut off.
@@ -480,6 +487,7 @@ def prune_vine(
     segmenter: str = "",
     glance_s: float = GLANCE_S,
     cultivar: str = USUAL,
+    method: str = OURS,
 ) -> VineRun:
     """Arrive, survey, decide, cut, leave, and judge.
 
@@ -495,6 +503,7 @@ def prune_vine(
         segmenter: In place of the configured one.
         glance_s: Look at one of several pictures (s).
         cultivar: How the vine grows: a preset of the vineyard.
+        method: Whole-body method.
 
     Raises:
         InputError: There is no such preset.
@@ -519,7 +528,7 @@ def prune_vine(
             world, settings = calibrated(world), _in_the_field(world)
         settings |= one_vine(training, length, cultivar)
         config = sim_config(Path(folder) / "vine.toml", pictures, world, settings)
-        with ClosedLoop(seed, path, config, "hierarchy", watch, segmenter=segmenter) as loop:
+        with ClosedLoop(seed, path, config, method, watch, segmenter=segmenter) as loop:
             before = row_of(loop)
             guyot = training == "guyot"
             touches, wanted = CaneTouches(staying_rods(before, guyot)), wanted_cuts(before, guyot)
@@ -544,7 +553,7 @@ def prune_vine(
         stages=visit.stages | clock.stages,
         decisions=reviewer.decisions,
         refusals=reviewer.refusals,
-        cuts=judged_cuts("hierarchy", seed, tuple(reviewer.accepted.values()), ends, wanted, bites, {}),
+        cuts=judged_cuts(method, seed, tuple(reviewer.accepted.values()), ends, wanted, bites, {}),
         places=places(before, wanted, bites, reviewer, ends, sites),
         contacts=int(np.count_nonzero(record.rows["contacts"])),
         self_contacts=int(np.count_nonzero(record.rows["self_contacts"])),
@@ -557,6 +566,7 @@ def prune_vine(
         stops=visit.stops,
         cultivar=cultivar,
         false_stops=sum(stop.false for stop in stops_of(events, record.rows)),
+        method=method,
     )
 
 
@@ -752,6 +762,12 @@ def main(argv: Sequence[str]) -> int:
     parser.add_argument(
         "--cultivar", choices=tuple(CULTIVARS), default=USUAL, help="how the vines grow (default: %(default)s)"
     )
+    parser.add_argument(
+        "--method",
+        choices=(*METHODS, *PEERS),
+        default=OURS,
+        help="whole-body method (default: %(default)s; pink and mink need `make peers`)",
+    )
     parser.add_argument("--seed", type=_count, default=3100, help="of the first vine (default: %(default)s)")
     parser.add_argument("--count", type=_positive, default=30, help="vines (default: %(default)s)")
     parser.add_argument(
@@ -775,10 +791,12 @@ def main(argv: Sequence[str]) -> int:
     )
     parser.add_argument("--segmenter", default="", choices=SEGMENTERS, help="in place of the configured one")
     words = parser.parse_args(argv)
+    use_peers([words.method])
     known = [] if words.json is None else read(words.json)
     runs: list[VineRun] = []
     for seed in range(words.seed, words.seed + words.count):
-        key = (words.training_system, words.preset, words.review, words.decision, words.glance, words.cultivar, seed)
+        grown = words.training_system, words.preset, words.cultivar, seed
+        key = (*grown, words.review, words.decision, words.glance, words.method)
         found = next((run for run in known if run.key == key), None)
         if found is None:
             found = prune_vine(
@@ -791,6 +809,7 @@ def main(argv: Sequence[str]) -> int:
                 words.segmenter,
                 words.glance,
                 words.cultivar,
+                words.method,
             )
             known.append(found)
             # Many vines take hours: what is done is on disk, and the next run goes on from there.

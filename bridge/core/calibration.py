@@ -85,8 +85,11 @@ class Calibration:
             (self.arm, reasons.arm_calibration_old),
             (self.timing, reasons.timing_calibration_old),
         )
-        ages = [(wall_time - each.made_at, old) for each, old in used if each is not None]
-        return tuple(old(age // DAY_S) for age, old in ages if age > OLD_S)
+        told = []
+        for each, old in used:
+            if each is not None and (age := wall_time - each.made_at) > OLD_S:
+                told.append(old(age // DAY_S))
+        return tuple(told)
 
     def own_angles(self, arm: Array) -> Array:
         """Angles of the joints by their own encoders (7, rad), in which their limits hold, from those as drawn."""

@@ -364,7 +364,7 @@ def test_a_run_goes_on_where_the_last_one_stopped_and_its_file_is_drawn(tmp_path
     path = tmp_path / "vine.json"
     assert bench.main(["--seed", "7", "--count", "1", "--json", str(path)]) == 0
     assert bench.main(["--seed", "7", "--count", "2", "--json", str(path)]) == 0
-    assert made == [(seed, "spur", "calm", "each", 3.0, 2.0, "", 0.33, "standard") for seed in (7, 8)]
+    assert made == [(seed, "spur", "calm", "each", 3.0, 2.0, "", 0.33, "standard", "hierarchy") for seed in (7, 8)]
     document = json.loads(path.read_text())
     assert document["summary"]["spur, calm, each 3 s"]["right"] == pytest.approx(
         {"value": 0.5, "low": 0.15, "high": 0.85, "n": 4}, abs=0.01
@@ -391,33 +391,38 @@ def test_without_vines_there_is_no_picture_of_them(tmp_path: Path):
         draw_vine(tmp_path, Figure())
 
 
-def test_vines_of_another_cultivar_are_figures_of_their_own(tmp_path: Path, monkeypatch, capsys):
+def test_vines_of_another_cultivar_or_method_are_figures_of_their_own(tmp_path: Path, monkeypatch, capsys):
     made = []
 
     def pruned(seed, *rest):
-        made.append(rest[-1])
-        return run(seed, cultivar=rest[-1])
+        made.append(rest[-2:])
+        return run(seed, cultivar=rest[-2], method=rest[-1])
 
     monkeypatch.setattr(bench, "prune_vine", pruned)
     path = tmp_path / "vine.json"
-    for words in ([], ["--cultivar", "vigorous"], ["--cultivar", "vigorous"]):
+    for words in ([], ["--cultivar", "vigorous"], ["--cultivar", "vigorous"], ["--method", "decoupled"]):
         assert bench.main(["--seed", "7", "--count", "1", "--json", str(path), *words]) == 0
-    assert made == ["standard", "vigorous"], "the third run finds its vine in the file"
-    assert set(json.loads(path.read_text())["summary"]) == {"spur, calm, each 3 s", "spur, vigorous, calm, each 3 s"}
+    assert made == [("standard", "hierarchy"), ("vigorous", "hierarchy"), ("standard", "decoupled")], "one is on file"
+    assert set(json.loads(path.read_text())["summary"]) == {
+        "spur, calm, each 3 s",
+        "spur, vigorous, calm, each 3 s",
+        "decoupled: spur, calm, each 3 s",
+    }
     assert capsys.readouterr().out.count("spur, vigorous, calm, each 3 s, seed 7:") == 2
     figure = Figure()
     draw_vine(tmp_path, figure)
     assert [panel.get_title(loc="left") for panel in figure.axes] == [
         "spur, calm, each 3 s a decision (1 vines)",
         "spur, vigorous, calm, each 3 s a decision (1 vines)",
+        "decoupled: spur, calm, each 3 s a decision (1 vines)",
     ]
 
 
-def test_a_file_from_before_there_were_cultivars_has_vines_of_the_usual_one(tmp_path: Path):
+def test_a_file_from_before_there_were_cultivars_and_methods_has_vines_of_the_usual_ones(tmp_path: Path):
     path = tmp_path / "vine.json"
     document = bench.document([run(7)], 2.0, "")
     for each in document["results"]:
-        del each["cultivar"]
+        del each["cultivar"], each["method"]
     path.write_text(json.dumps(document))
     assert bench.read(path) == [run(7)] and bench.read(path)[0].cultivar == "standard"
     draw_vine(tmp_path, Figure())
@@ -447,6 +452,7 @@ def test_a_file_of_something_else_is_refused_and_stays(tmp_path: Path, text):
         ["--preset", "hail"],
         ["--training-system", "bush"],
         ["--cultivar", "oak"],
+        ["--method", "magic"],
         ["--count", "0"],
         ["--decision", "-1"],
         ["--decision", "x"],
@@ -486,6 +492,7 @@ def test_a_vine_without_canes_asks_for_no_cut_and_gets_none(monkeypatch):
         return Row(tuple(None if rod is not None and rod.cane >= 0 else rod for rod in row.rods), 0, row.backdrop)
 
     monkeypatch.setattr(build, "grow", bare)
-    found = bench.prune_vine(3, segmenter="labels", pictures=0.7, decision_s=1.0)
+    found = bench.prune_vine(3, segmenter="labels", pictures=0.7, decision_s=1.0, method="decoupled")
+    assert found.method == "decoupled"
     assert found.ended == "" and not found.places and not found.cuts and found.stages["blades"] == 0.0
     assert np.isfinite(found.machine_s) and bench.summarise([found])["right"].value is None

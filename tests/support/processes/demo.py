@@ -129,7 +129,7 @@ class Demo(DemoProcess):
     A session holds one robot at a time.
     """
 
-    def __init__(self, port: int, seed: int, config: Path | None = None, *more: str) -> None:
+    def __init__(self, port: int, seed: int, config: Path | None = None, *more: str, points: int = 2) -> None:
         """Start it and wait until detections have come.
 
         Args:
@@ -137,6 +137,7 @@ class Demo(DemoProcess):
             seed: Of the row.
             config: TOML configuration; None takes the simulation's.
             more: Other options of the demo.
+            points: How many detections to wait for; 0 where something stands before the row.
 
         Raises:
             InputError: It did not come up; the text is what it said.
@@ -148,13 +149,13 @@ class Demo(DemoProcess):
         #: Who holds each robot.
         self.scripts = [self.client]
         try:
-            self._sign_in()
+            self._sign_in(points)
         except BaseException:
             # Nobody has it yet who could close it.
             self.close()
             raise
 
-    def _sign_in(self) -> None:
+    def _sign_in(self, points: int) -> None:
         self.wait_until_up(180.0)
         token = re.search(r"/sign-in\?token=(\S+)", self.text())
         wire = re.search(r"--connect (\S+) --certificates (\S+)", self.text())
@@ -170,7 +171,7 @@ class Demo(DemoProcess):
             self.scripts.append(
                 httpx.Client(base_url=self.url, headers={"Origin": self.url, "Cookie": cookie}, timeout=10)
             )
-        self.wait(lambda: all(len(self._points(path)) >= 2 for path in self.paths), 90.0)
+        self.wait(lambda: all(len(self._points(path)) >= points for path in self.paths), 90.0)
 
     def wait(self, condition: Callable[[], Any], limit_s: float) -> None:
         """Poll until `condition()` holds.
