@@ -5,6 +5,7 @@ asks for it as a script does, watches, and shows the result.
 """
 
 import argparse
+import contextlib
 import getpass
 import math
 import time
@@ -215,6 +216,9 @@ class _Page:
         return self
 
     def __exit__(self, *_: object) -> None:
+        """Give up control, so that whoever comes next need not wait for it to lapse."""
+        with contextlib.suppress(self._unanswered):
+            self._client.post("/api/control/return")
         self._client.close()
 
     def get(self, what: str) -> Any:

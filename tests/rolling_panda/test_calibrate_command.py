@@ -60,10 +60,13 @@ class PlayedPage:
         self.arm_offer: dict[str, object] | None = JOINTS
         self.arm_refused: dict[str, object] | None = None
         self.posted: list[tuple[str, object]] = []
+        self.given_back = 0
 
     def answer(self, request: httpx.Request) -> httpx.Response:
         path = request.url.path.removeprefix("/api/")
-        if request.method == "POST":
+        if path == "control/return":
+            self.given_back += 1
+        elif request.method == "POST":
             self.posted.append((path, json.loads(request.content) if request.content else None))
             if path == "base/use" and path not in self.refusal:
                 self.base = self.base_offer
@@ -116,6 +119,7 @@ def test_the_camera_is_calibrated_and_the_result_used(page: PlayedPage, capsys: 
         ("camera/calibrate", None),
         ("camera/use", {"made_at": 1.8e9}),
     ]
+    assert page.given_back == 1
     told = capsys.readouterr().out
     assert "the camera is taken to be where it is drawn" in told and "25 views by board" in told
 
@@ -156,7 +160,7 @@ def test_ctrl_c_pauses_the_robot(page: PlayedPage) -> None:
     page.interrupts = True
     with pytest.raises(KeyboardInterrupt):
         main(["calibrate", "camera", LINK, "--yes"])
-    assert page.posted[-1] == ("pause", None)
+    assert page.posted[-1] == ("pause", None) and page.given_back == 1
 
 
 def test_what_the_page_refuses_is_told(page: PlayedPage, capsys: pytest.CaptureFixture[str]) -> None:

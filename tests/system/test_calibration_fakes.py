@@ -66,6 +66,7 @@ def test_camera_arm_and_base_are_found_by_libfranka_ros_and_librealsense(tmp_pat
     demo = Demo(free_port(), SEED, config, "--bridge", "real", "--fakes", points=0)
     try:
         assert demo.state()["bridge"]["kind"] == "fakes"
+        demo.wait(lambda: all(demo.client.get(f"/api/{path}").is_success for path in ("camera", "calibration")), 60.0)
         assert re.search(r"\d\d views", calibrate(demo, "arm"))
         arm = demo.state()["bridge"]["arm"]
         assert np.abs(np.array(arm["offsets"])[1:6] - errors.joint_offset[1:6]).max() < 0.0005
