@@ -23,6 +23,10 @@ _CONNECTIVITY = np.ones((3, 3), dtype=bool)
 _MIN_SPUR, _MIN_TRUNK = 12, 300
 #: Blobs of spur nearer than this, with centres nearer than this, are one spur behind something thin (m).
 _SAME_SPUR, _NEAR_SPUR = 0.025, 0.08
+#: Points of a stub are nearer than this to its median depth, and in so many rounds nearer than this to its axis (m).
+_STUB_DEPTH, _STUB_ROUNDS, _STUB_ACROSS = 0.03, 2, 0.015
+#: Percentiles of the points across a stub, which are seen evenly over its width.
+_WIDTH = (5.0, 95.0)
 #: Stride of the cordon pixels, and number of pixels for a direction.
 _CORDON_STRIDE, _MIN_CORDON = 4, 50
 
@@ -168,21 +172,42 @@ def _row_direction(cordon: Array, view: View) -> Array:
 
 
 def _spur(view: View, cloud: Array, cordon: cKDTree | None, canes: list[Cane], incomplete: Reason | None) -> Spur:
-    centre = cloud.mean(axis=0)
-    spread, axes = _principal(cloud - centre)
+    wood = _of_stub(view, cloud)
+    centre = wood.mean(axis=0)
+    spread, axes = _principal(wood - centre)
     axis, radius = None, 0.0
     if cordon is not None and spread[0] > 1.5 * spread[1]:
-        along = (cloud - centre) @ axes[0]
+        along = (wood - centre) @ axes[0]
         ends = centre + np.outer(np.percentile(along, [2, 98]), axes[0])
         gaps, _ = cordon.query(ends)
         ends = ends if gaps[0] <= gaps[1] else ends[::-1]
-        across = (cloud - centre) @ axes[1]
-        least, most = np.percentile(across, [5, 95])
-        radius = float(most - least) / 2 * 1.05
         ray = centre - view.t
-        square = ray - float(ray @ axes[0]) * axes[0]
-        axis = ends + square / np.linalg.norm(square) * radius * SURFACE_OFFSET
+        depth = ray - float(ray @ axes[0]) * axes[0]
+        depth /= np.linalg.norm(depth)
+        least, most = np.percentile((wood - centre) @ np.cross(axes[0], depth), _WIDTH)
+        radius = float(most - least) / 2 * 100.0 / (_WIDTH[1] - _WIDTH[0])
+        axis = ends + depth * radius * SURFACE_OFFSET
     return Spur(centre, axis, radius, tuple(sorted(canes, key=lambda cane: -cane.length)), incomplete)
+
+
+def _of_stub(view: View, cloud: Array) -> Array:
+    """The points of a spur that are on its stub (N×3, m, odom); all of them where hardly any is.
+
+    At the edge of wood the depth camera tells distances between the wood and what is behind it. A few such points,
+    far behind a stub, turn its principal axis.
+    """
+    depth = (cloud - view.t) @ view.R[:, 2]
+    wood = cloud[np.abs(depth - np.median(depth)) < _STUB_DEPTH]
+    for _ in range(_STUB_ROUNDS):
+        if len(wood) < _MIN_SPUR:
+            return cloud
+        off = wood - wood.mean(axis=0)
+        axis = _principal(off)[1][0]
+        near = np.linalg.norm(off - np.outer(off @ axis, axis), axis=1) < _STUB_ACROSS
+        if near.all():
+            break
+        wood = wood[near]
+    return wood if len(wood) >= _MIN_SPUR else cloud
 
 
 def _principal(off: Array) -> tuple[Array, Array]:
