@@ -1,7 +1,7 @@
 """Camera frames in, pruning points out."""
 
 import copy
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -235,15 +235,17 @@ class Perception:
         self._spur_pictures.add(view, plant, numbers)
         fused = {spur.number: spur.as_spur() for spur in self.plant_map.spurs} if self._config.fuse else {}
         keep_out = frame_keep_out(view, labels, self._wood, self._config.rule)
-        proposals: list[Proposal] = []
+        decisions: list[tuple[Spur, SpurNumber, Decision]] = []
         contradicted: set[Site] = set()
         for seen, spur, number in zip(plant.spurs, spurs, numbers, strict=True):
             decision = apply_rule(fused.get(number, spur), self._config.rule, plant.other_canes(seen), keep_out)
-            proposals += [Proposal(cut, number) for cut in decision.cuts]
+            decisions.append((spur, number, decision))
             contradicted |= {(number, kind) for kind in decision.contradicted}
+        self._apply(self._tracker.update(view, labels, _proposals(decisions), numbers, contradicted))
+        unconfirmed = self._tracker.unconfirmed()
+        for spur, number, decision in decisions:
             aside = abs(float(view.R[:, 0] @ (spur.position - view.t)))
-            self._update_undecided(number, spur, decision, in_front=aside < _IN_FRONT)
-        self._apply(self._tracker.update(view, labels, proposals, numbers, contradicted))
+            self._update_undecided(number, spur, decision, aside < _IN_FRONT, unconfirmed)
         self._update_obstacles(view, labels, cylinders, numbers)
         self._cane_lines = self.plant_map.cane_lines()
         self._site_messages = self._undecided_sites()
@@ -511,8 +513,17 @@ class Perception:
             decisions.append((spur, number, apply_rule(spur, rule, other_canes, keep_out)))
         return decisions
 
-    def _update_undecided(self, number: SpurNumber, spur: Spur, decision: Decision, in_front: bool) -> None:
+    def _update_undecided(
+        self,
+        number: SpurNumber,
+        spur: Spur,
+        decision: Decision,
+        in_front: bool,
+        unconfirmed: Collection[Site] = (),
+    ) -> None:
         causes = list(decision.undecided)
+        if any((number, cut.kind) in unconfirmed for cut in decision.cuts):
+            causes.append(reasons.cut_unconfirmed())
         has_cuts = any(cut.kind != "renewal cut" for cut in decision.cuts)
         self._undecided.update(number, has_cuts, causes, vector3(spur.position), in_front)
 

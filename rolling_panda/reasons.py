@@ -1660,6 +1660,11 @@ def old_cane_left() -> None:
 
 
 @_reason("info", "")
+def cut_unconfirmed() -> None:
+    """A cut was seen here, but not yet in enough pictures or from enough places."""
+
+
+@_reason("info", "")
 def canes_at_same_height() -> None:
     """Two canes leave the spur at about the same height, so which is the lower is open."""
 

@@ -25,6 +25,7 @@ _LOOK_AGAIN = frozenset(
         reasons.spur_at_image_edge(),
         reasons.stray_cane_hidden(),
         reasons.no_cordon_in_range(0, 0),
+        reasons.cut_unconfirmed(),
     )
 )
 

@@ -470,7 +470,7 @@ def origin(cane: Cane, root: Array, along: Array) -> tuple[float, float]:
         root: Of the stub (3, m, odom).
         along: Unit vector along the stub (3, odom).
     """
-    off = cane.base - root
+    off = cane.origin - root
     seen = float(off @ along)
     direction = cane.at(float(cane.arc[0]) + _BASE) - cane.base
     forward = float(direction @ along)

@@ -414,6 +414,11 @@ class Tracker:
             published.add(track.site)
             track.published = self._message(track)
 
+    def unconfirmed(self) -> set[Site]:
+        """Spurs and kinds of cuts that were proposed, but not by enough frames and viewpoints for a point."""
+        published = {track.site for track in self._tracks if track.published is not None}
+        return {track.site for track in self._tracks} - published - self._moved()
+
     def _moved(self) -> set[Site]:
         """Sites whose cut an operator has moved."""
         return {(track.number, track.replaces) for track in self._tracks if track.replaces is not None}

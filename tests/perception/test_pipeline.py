@@ -275,6 +275,19 @@ def test_a_place_that_an_operator_leaves_needs_nothing_until_that_is_taken_back(
     assert (answer.ok, answer.reason) == (False, reasons.site_unknown(99, 1))
 
 
+def test_a_spur_that_was_told_of_stays_a_point_or_an_open_place(model, frames):
+    seen, told, unconfirmed = perception(model), set(), []
+    for frame in frames:
+        result = seen.process(frame)
+        points = {(point.vine, point.spur) for point in result.points}
+        sites = {(site.vine, site.spur) for site in result.undecided_sites if site.vine}
+        told |= points | sites
+        assert told == points | sites
+        unconfirmed.append([site for site in result.undecided_sites if site.reason.code == "cut_unconfirmed"])
+    assert unconfirmed[0] and all(site.needs == "another look" for site in unconfirmed[0])
+    assert len(unconfirmed[-1]) < len(unconfirmed[0])
+
+
 def test_an_empty_view_gives_no_points(model, frames):
     k = frames[0].intrinsics
     blank = zlib.compress(bytes(k.width * k.height))

@@ -319,6 +319,15 @@ def test_a_stub_is_cut_midway_between_where_its_canes_come_out_of_it():
     assert cut.position[2] == pytest.approx((0.93 + 0.98) / 2, abs=1e-3)
 
 
+@pytest.mark.parametrize("hidden", [4, 8, 16])
+def test_a_stub_is_cut_by_where_all_pictures_have_the_bases_of_its_canes(hidden):
+    """One picture may show the lower cane from 20, 40 or 80 mm on alone, above the base of the upper one."""
+    low, high = cane(base=(0.025, 0.0, 0.93)), cane(base=(0.0, 0.0, 0.99))
+    partly = replace(low, axis=low.axis[hidden:], arc=low.arc[hidden:])
+    (_, whole), (_, cut) = apply_rule(spur(low, high), RULE).cuts, apply_rule(spur(partly, high), RULE).cuts
+    np.testing.assert_allclose(cut.position, whole.position, atol=1e-3)
+
+
 def test_a_cane_that_goes_on_along_its_stub_grows_from_below_the_end_of_it():
     """The stub ends at 0.99 m and has a radius of 7 mm. What is seen of the cane begins at the end, or past it."""
     low = leaving((0.010, 0.0, 0.94), np.pi / 4)

@@ -47,3 +47,36 @@ def test_an_old_cut_by_itself_is_no_spur() -> None:
     assert seen.labels is not None
     seen.labels[seen.labels == KIND("spur")] = KIND("old cut")
     assert perceive_plant(seen, seen.labels, SkeletonConfig()).spurs == ()
+
+
+@pytest.mark.parametrize("behind", [0.1, 0.5, 2.0])
+@pytest.mark.parametrize("share", [0.1, 0.35])
+def test_a_stub_is_measured_by_its_wood_and_not_by_what_the_camera_mixed_with_the_background(
+    behind: float, share: float
+) -> None:
+    """At the edge of wood a depth camera tells distances between the wood and what is behind it."""
+    seen = vine("spur")
+    assert seen.labels is not None
+    rows, cols = np.nonzero(seen.labels == KIND("spur"))
+    rng = np.random.default_rng(1)
+    mixed = rng.random(len(rows)) < share
+    seen.depth[rows[mixed], cols[mixed]] += rng.uniform(0.0, behind, mixed.sum()).astype(np.float32)
+    (spur,) = perceive_plant(seen, seen.labels, SkeletonConfig()).spurs
+    assert spur.axis is not None
+    root, tip = spur.axis
+    along = (tip - root) / np.linalg.norm(tip - root)
+    pixel = 0.8 / LENS.fy
+    # Upright, from the cordon to the cane: 51 pixels high and 12 wide.
+    assert along[2] > 0.99
+    assert np.linalg.norm(tip - root) == pytest.approx(51 * pixel, rel=0.1)
+    assert spur.radius == pytest.approx(6 * pixel, rel=0.15)
+    assert abs(spur.position[1] - 0.8) < 0.015
+
+
+def test_of_hardly_any_wood_the_stub_is_all_that_is_seen() -> None:
+    seen = vine("spur")
+    assert seen.labels is not None
+    rows, cols = np.nonzero(seen.labels == KIND("spur"))
+    seen.depth[rows, cols] = np.linspace(0.4, 2.0, len(rows), dtype=np.float32)
+    (spur,) = perceive_plant(seen, seen.labels, SkeletonConfig()).spurs
+    assert np.isfinite(spur.position).all()

@@ -203,8 +203,10 @@ def test_a_point_that_more_frames_speak_against_than_for_is_withdrawn_until_they
     look([], (SpurNumber(1, 1), "renewal cut"))
     look([], (SpurNumber(2, 1), "spur cut"))
     assert tracker.points() == (before,), "those speak against others"
+    assert not tracker.unconfirmed()
     assert look([], site) == (reasons.withdrawn_as_contradicted(before.point_id, 1, 1),) and not tracker.points()
-    assert not look([proposal()])
+    assert tracker.unconfirmed() == {site}, "nobody may take the spur for one without a cut"
+    assert not look([proposal()]) and not tracker.unconfirmed()
     (after,) = tracker.points()
     assert (after.point_id, after.revision) == (before.point_id, before.revision + 1)
 
