@@ -2827,6 +2827,11 @@ def not_reached_for(goal: Goal, position_mm: float, rotation_deg: float, cause: 
 
 
 @_reason("warning", "")
+def joints_not_reached(goal: Goal, rotation_deg: float, cause: str) -> None:
+    """{cause} held the arm; {goal} was missed by {rotation_deg:.1f}° in a joint."""
+
+
+@_reason("warning", "")
 def retreat_by_joints(point: str, why: Reason) -> None:
     """{point}: the straight way back failed, the arm now retreats by its joints: {why}."""
 

@@ -512,7 +512,7 @@ class EscapingByJoints(Stage):
         if self._withdrawal.done:
             return Rest(self._parts).step(robot, now)
         if self._withdrawal.late:
-            return self, self._parts.brake(robot, missed(_CLEAR, tracking))
+            return self, self._parts.brake(robot, self._withdrawal.missed(_CLEAR, robot))
         return self, StepResult(tracking.xi, tracking)
 
 
@@ -743,7 +743,7 @@ class Arranging(MovingStage):
             self._arm = Withdrawal(parts.config, parts.follower, robot.q, plan.q_clear)
         tracking = self._arm.step(robot, now)
         if self._arm.late:
-            return self._another_time(robot, missed("the stand-off", tracking))
+            return self._another_time(robot, self._arm.missed("the stand-off", robot))
         return self, StepResult(tracking.xi, tracking)
 
 
@@ -1003,7 +1003,7 @@ class Withdraw(LeavingStage):
         self._parts.look_back(robot, now)
         tracking = self._withdrawal.step(robot, now)
         if self._withdrawal.late:
-            return self, self._parts.brake(robot, missed("the way back", tracking))
+            return self, self._parts.brake(robot, self._withdrawal.missed("the way back", robot))
         if self._withdrawal.done:
             return self._out(robot, tracking, now)
         return self, StepResult(tracking.xi, tracking)

@@ -11,6 +11,7 @@ from controller.motion.tool_motion import Leg, ToolMotion
 from controller.whole_body.saturation import Saturation
 from controller.work.posture_search import escape_pose
 from controller.work.step_result import StepResult
+from rolling_panda import reasons
 from rolling_panda.messages.types import Reason
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import ARM_Q
@@ -83,7 +84,8 @@ def go_home(homing: Homing, robot: Measured, saturation: Saturation, blocked: Ca
 class Withdrawal:
     """A joint-space retreat with the base at rest: each joint goes straight to its position where the tool is clear.
 
-    The collision guard stays on. The blades deviate from a straight line as `PostureSearch.arm_at` allows.
+    The collision guard stays on. The tool leaves the straight line: from a cut by as much as `PostureSearch.arm_at`
+    allows, which chose the posture; on the way to a cut it is clear of the canes.
     """
 
     def __init__(self, config: ControllerConfig, follower: Follower, q: Array, q_clear: Array) -> None:
@@ -95,6 +97,7 @@ class Withdrawal:
         self._timeout.start(self._motion.duration)
         #: Whether the arm has arrived, and whether the motion has failed.
         self.done = self.late = False
+        self._held_by = UNNAMED
 
     def hold(self) -> None:
         """The robot stands for one period."""
@@ -107,4 +110,10 @@ class Withdrawal:
         self._timeout.over(tracking, now, 0.0)
         self.done = self._motion.done and float(abs(robot.q[ARM_Q] - self._goal).max()) < _NEAR
         self.late = not self.done and self._timeout.late(now)
+        self._held_by = tracking.reason or UNNAMED
         return tracking
+
+    def missed(self, goal: reasons.Goal, robot: Measured) -> Reason:
+        """The remaining error of the joints on the way to `goal`, and what has held them."""
+        off = float(abs(robot.q[ARM_Q] - self._goal).max())
+        return reasons.joints_not_reached(goal, float(np.degrees(off)), self._held_by)

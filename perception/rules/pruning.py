@@ -463,7 +463,8 @@ def _renew(spur: Spur, keeper: _Keeper, shorten: Cut | Reason, config: RuleConfi
 def origin(cane: Cane, root: Array, along: Array) -> tuple[float, float]:
     """Where the axis of a cane comes out of that of its stub, and where it begins to be seen, from the stub's root (m).
 
-    What is seen of a cane begins at the bark of the stub: where it leaves at an angle, farther out than its axis.
+    That is where all pictures begin to see it, in the median. What is seen of a cane begins at the bark of the stub:
+    where it leaves at an angle, farther out than its axis.
 
     Args:
         cane: The cane.

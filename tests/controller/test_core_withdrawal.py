@@ -6,6 +6,7 @@ import numpy as np
 from controller.motion.follower import Follower
 from controller.work.posture_search import CutClearance, CutPlan, PostureSearch, completed
 from rolling_panda import commands as intents
+from rolling_panda import messages as m
 from rolling_panda.model.robot import ARM_Q, RobotModel
 from rolling_panda.reasons import text_of
 from tests.support.controller_at_work import CONFIG, entry, run_until, working
@@ -50,7 +51,16 @@ def test_held_by_its_joints_too_it_pauses_and_says_why(monkeypatch):
     run_until(r, lambda s: s is not None and s.mode == "AUTO", 1.0)
     run_until(r, lambda s: s.mode != "AUTO", 40.0)
     assert r.state.mode == "PAUSED" and "joint 1" in text_of(r.state.reason)
+    assert joints_missed(r.state.reason) > 1.0
     assert entry(r, "b").state == "ACCEPTED" and len(r.cuts) == 1
+
+
+def joints_missed(reason):
+    """By how much (degrees) the joints are told to be off; of a reason or one of its causes."""
+    values = dict(reason.values)
+    if reason.code == "joints_not_reached":
+        return values["rotation_deg"]
+    return max((joints_missed(each) for each in values.values() if isinstance(each, m.Reason)), default=0.0)
 
 
 def interrupted_among_the_canes(r):
@@ -79,6 +89,7 @@ def test_held_by_its_joints_too_on_the_way_out_it_pauses_and_says_why(monkeypatc
     interrupted_among_the_canes(r)
     run_until(r, lambda s: s.mode != "AUTO", 40.0)
     assert r.state.mode == "PAUSED" and "joint 1" in text_of(r.state.reason)
+    assert joints_missed(r.state.reason) > 1.0
     assert not r.cuts
 
 

@@ -322,7 +322,7 @@ def test_a_stub_is_cut_midway_between_where_its_canes_come_out_of_it():
 @pytest.mark.parametrize("hidden", [4, 8, 16])
 def test_a_stub_is_cut_by_where_all_pictures_have_the_bases_of_its_canes(hidden):
     """One picture may show the lower cane from 20, 40 or 80 mm on alone, above the base of the upper one."""
-    low, high = cane(base=(0.025, 0.0, 0.93)), cane(base=(0.0, 0.0, 0.99))
+    low, high = leaving((0.0, 0.0, 0.93), 0.8), cane(base=(0.0, 0.0, 0.99))
     partly = replace(low, axis=low.axis[hidden:], arc=low.arc[hidden:])
     (_, whole), (_, cut) = apply_rule(spur(low, high), RULE).cuts, apply_rule(spur(partly, high), RULE).cuts
     np.testing.assert_allclose(cut.position, whole.position, atol=1e-3)
