@@ -90,14 +90,15 @@ class SecurityMiddleware:
         if session is None and not is_public(path):
             await _refuse(with_headers, 401, reasons.not_signed_in())
             return
+        is_optional = OPTIONAL_BODY.fullmatch(path) is not None
         try:
-            async with asyncio.timeout(_OPTIONAL_BODY_S if path in OPTIONAL_BODY else None):
+            async with asyncio.timeout(_OPTIONAL_BODY_S if is_optional else None):
                 body = await _read_body(receive, self._max_body)
         except (TimeoutError, ClientDisconnect):
-            if path not in OPTIONAL_BODY:
+            if not is_optional:
                 return
             body = None
-        if body is None and path in OPTIONAL_BODY:
+        if body is None and is_optional:
             body = b""
         if body is None:
             await _refuse(with_headers, 413, reasons.body_too_long(float(self._max_body)))

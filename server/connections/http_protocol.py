@@ -2,6 +2,7 @@
 
 import asyncio
 import random
+import re
 from typing import Any
 
 import h11
@@ -15,8 +16,9 @@ from server.connections.listener import Connection, Connections, refusal
 
 #: Time for which a refused connection stays open (s): a reset would discard the reason before the client reads it.
 LINGER_S = 1.0
-#: Requests with an optional body: one that is too long or too late is ignored, and the request proceeds.
-OPTIONAL_BODY = frozenset({"/api/stop"})
+#: Paths with an optional body, of one robot or of several: a body that is too long or too late is ignored, and the
+#: request proceeds.
+OPTIONAL_BODY = re.compile(r"(/robots/[^/]+)?/api/stop")
 _EARLIEST = 0.8
 
 
@@ -126,7 +128,7 @@ class TimedHttp(H11Protocol):
         """What has to come next; empty while a request is answered."""
         if self.conn.their_state is h11.SEND_BODY:
             # The application waits for an optional body itself, and not for long.
-            is_optional = self.scope["path"] in OPTIONAL_BODY and not self._is_body_left_over()
+            is_optional = OPTIONAL_BODY.fullmatch(self.scope["path"]) and not self._is_body_left_over()
             return "" if is_optional else "body"
         if self.conn.their_state is h11.IDLE:
             return "head" if self.conn.trailing_data[0] else "request"

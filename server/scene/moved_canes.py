@@ -24,8 +24,11 @@ class MovedCanes:
         self._drawn: object = None
         self._moved: dict[int, Capsule] = {}
 
-    def restart(self) -> None:
-        """The row at rest was drawn anew, with all of its rods."""
+    def rest(self, row: Scenery) -> None:
+        """Draw all rods at rest again, before the row changes; `row` is as it was drawn at rest."""
+        for kind, moving in self._moving.items():
+            if moving:
+                self._take_out(row, kind, set())
         for handle in self._handles.values():
             handle.remove()
         self._moving, self._handles, self._drawn, self._moved = {}, {}, None, {}

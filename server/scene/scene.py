@@ -138,8 +138,9 @@ class Scene:
             removed = removed_capsules(before.capsules, scenery.capsules)
             if removed:
                 self.falling.drop("/row", removed, now, dim=True)
-        if self._show_capsules("/row", scenery.capsules, self._rods, dim=True):
-            self._moved.restart()
+        if before is not None and scenery.capsules != before.capsules:
+            self._moved.rest(before)
+        self._show_capsules("/row", scenery.capsules, self._rods, dim=True)
 
     def show_row_motion(self, motion: SceneryMotion) -> None:
         """Draw the canes of the simulated row that wind and arm have displaced."""
@@ -162,9 +163,8 @@ class Scene:
         drawn: dict[str, list[Capsule]],
         dim: bool = False,
         grow: float = 0.0,
-    ) -> bool:
-        """Draw the kinds that have changed; returns whether any has."""
-        changed = False
+    ) -> None:
+        """Draw the kinds that have changed."""
         by_kind: dict[str, list[Capsule]] = {kind: [] for kind in drawn_kinds()}
         for capsule in capsules:
             if capsule.kind in by_kind:
@@ -172,7 +172,6 @@ class Scene:
         for kind in drawn_kinds():
             if by_kind[kind] == drawn.get(kind, []):
                 continue
-            changed = True
             drawn[kind] = by_kind[kind]
             if by_kind[kind]:
                 vertices, faces = capsules_mesh(kind, by_kind[kind], grow)
@@ -185,7 +184,6 @@ class Scene:
                 )
             else:
                 self._server.scene.remove_by_name(f"{root}/{kind}")
-        return changed
 
     def show_points(self, points: tuple[PagePoint, ...], sites: tuple[UndecidedSite, ...] = ()) -> None:
         """Draw the pruning points by their state, and the sites that a person has to decide."""

@@ -79,6 +79,17 @@ def test_after_a_cut_the_capsules_of_the_new_row_are_told() -> None:
         motion = RowMotion(ROW, Wind(ROW, 0.02, 4), None)
 
 
+def test_after_a_cut_elsewhere_the_displaced_capsules_are_told_again_for_the_new_revision() -> None:
+    """The row is then drawn anew, at rest."""
+    motion = RowMotion(ROW, Wind(ROW, 0.02, 4), None)
+    before = motion.changed(ROW, TOOL, 1.0)
+    far = max(ROW.standing(), key=lambda each: abs(each[1].start[0] - TOOL[0]) if each[1].cane >= 0 else 0.0)[0]
+    row = ROW.sever(far, 0.5, None)
+    after = motion.changed(row, TOOL, 1.0)
+    assert before and after and len(after) == len(before)
+    assert motion.changed(row, TOOL, 1.0) is None
+
+
 def upright(x: float, lateral: bool = False) -> list[Rod]:
     """A cane of ten rods on a spur of its own, and a lateral that grows on its fifth rod."""
     z = np.linspace(0.5, 1.5, 11)

@@ -229,6 +229,17 @@ def test_a_motion_of_another_revision_waits_for_its_row_and_a_cut_row_begins_at_
     assert reach(scene, "moved cane") == (pytest.approx(0.5, abs=0.01), pytest.approx(1.0, abs=0.01))
 
 
+def test_after_a_cut_wood_of_another_kind_that_had_moved_stands_where_it_stood(scene: Drawn) -> None:
+    node = Capsule("node", (0.2, 0.8, 1.0), (0.2, 0.8, 1.02), 0.006, 0.006)
+    scene.show_row(row(0, STANDS[0], node, STANDS[2]), now=100.0)
+    moved = tuple(MovedCapsule(index, (0.23, 0.8, 1.0), (0.23, 0.8, 1.02)) for index in (1, 2))
+    scene.show_row_motion(SceneryMotion(header=m.Header(), revision=0, moved=moved))
+    assert reach(scene, "node")[1] - reach(scene, "node")[0] < 1e-6
+    scene.show_row(row(1, STANDS[0], node), now=101.0)
+    assert reach(scene, "node") == (pytest.approx(0.995, abs=0.01), pytest.approx(1.02, abs=0.01))
+    assert scene.handle("/row/moved node") is None and scene.handle("/row/moved cane") is None
+
+
 def test_a_row_at_rest_that_is_told_again_sends_nothing(scene: Drawn) -> None:
     scene.show_row(row(0, *STANDS), now=100.0)
     before = [id(each) for each in scene.kept()]

@@ -64,7 +64,7 @@ class RowMotion:
         shares = [(0.0, 0.0) if wind is None else wind.shares(index) for index in range(len(row.rods))]
         self._shares = np.array(shares).reshape(-1, 2)
         self._swinging = (amplitude * self._shares[:, 1] >= _LEAST).tolist()
-        self._revision = -1
+        self._revision = self._told_revision = -1
         self._looked: Array | None = None
         self._bent: set[_Cane] = set()
         self._told, self._told_ends = np.zeros(0, int), np.zeros((0, 2, 3))
@@ -94,10 +94,12 @@ class RowMotion:
                 own &= self._numbers[:, 3] == organ
                 lengths = self._organ_lengths
             ends[own] += bend(lengths[own], touched)[:, :, None] * displacement
-        still = np.array_equal(self._places, self._told)
-        if still and float(np.abs(ends - self._told_ends).max(initial=0.0)) < _LEAST:
+        still = np.array_equal(self._places, self._told) and self._told_revision == row.revision
+        nothing = not len(self._places) and not len(self._told)
+        if nothing or still and float(np.abs(ends - self._told_ends).max(initial=0.0)) < _LEAST:
             return None
-        self._told, self._told_ends = self._places, ends
+        # Whoever draws the row begins anew with each of its revisions.
+        self._told, self._told_ends, self._told_revision = self._places, ends, row.revision
         pairs = zip(self._places.tolist(), ends.tolist(), strict=True)
         return tuple(MovedCapsule(place, tuple(start), tuple(end)) for place, (start, end) in pairs)
 
