@@ -265,6 +265,18 @@ class Parts:
         clear = self.search.arm_at(goal, robot.q, robot.q[ARM_Q], posture)
         return None if clear is None else Withdrawal(self.config, self.follower, robot.q, clear)
 
+    def unwinding(self, robot: Measured) -> Withdrawal | None:
+        """The arm's way home by its joints from a posture that no plan has; None where it has another one.
+
+        Also None where that would bring the tool nearer to the row. From such a posture, at a joint limit or a
+        singularity, the next way would end in a worse one.
+        """
+        home = robot.q.copy()
+        home[ARM_Q] = self.config.work.home
+        if self.search.tenable(robot.q) or not self.search.leads_away(robot.q, home, robot.frame):
+            return None
+        return Withdrawal(self.config, self.follower, robot.q, home)
+
 
 class FollowedMotion:
     """A tool motion under way, with its timeout."""
@@ -461,14 +473,19 @@ class Escape(Stage):
 
     phase: m.Phase = "RETREAT"
 
+    def __init__(self, parts: Parts, unwinds: bool = True) -> None:
+        """With `unwinds` the arm then goes home if it is in a posture that no plan has."""
+        super().__init__(parts)
+        self._unwinds = unwinds
+
     def step(self, robot: Measured, now: float) -> Step:
         """One period."""
         config = self._parts.config.work
         clear = escape_pose(config, robot.kinematics.T_odom_tool, robot.frame, _AMONG)
         if clear is None:
-            return Rest(self._parts).step(robot, now)
+            return _rest_clear(self, self._parts, self._unwinds, robot, now)
         leg = Leg(clear, robot.q, config.advance_speed, math.inf)
-        return Escaping(self._parts, FollowedMotion(self._parts, robot, leg)).step(robot, now)
+        return Escaping(self._parts, FollowedMotion(self._parts, robot, leg), self._unwinds).step(robot, now)
 
 
 class Escaping(Stage):
@@ -477,16 +494,16 @@ class Escaping(Stage):
     phase: m.Phase = "RETREAT"
     yields = True
 
-    def __init__(self, parts: Parts, way: FollowedMotion) -> None:
-        """Along `way`."""
+    def __init__(self, parts: Parts, way: FollowedMotion, unwinds: bool) -> None:
+        """Along `way`; `unwinds` as of `Escape`."""
         super().__init__(parts, way)
-        self._way = way
+        self._way, self._unwinds = way, unwinds
 
     def step(self, robot: Measured, now: float) -> Step:
         """One period."""
         parts, tracking = self._parts, self._way.track(robot)
         if self._way.timeout.over(tracking, now, _NEAR):
-            return Rest(parts).step(robot, now)
+            return _rest_clear(self, parts, self._unwinds, robot, now)
         if not self._way.timeout.late(now):
             return self, StepResult(tracking.xi, tracking)
         withdrawal = parts.withdrawal(robot, self._way.motion.goal, np.array(parts.config.work.home))
@@ -495,8 +512,17 @@ class Escaping(Stage):
         return EscapingByJoints(parts, withdrawal), StepResult(tracking.xi, tracking)
 
 
+def _rest_clear(stage: Stage, parts: Parts, unwinds: bool, robot: Measured, now: float) -> Step:
+    """At the end of `stage`, with the tool clear of the canes: rest, in a posture from which a way may begin."""
+    unwinding = parts.unwinding(robot) if unwinds else None
+    if unwinding is None:
+        return Rest(parts).step(robot, now)
+    # One motion ends, and the other begins, at rest.
+    return (stage if np.any(robot.sent) else EscapingByJoints(parts, unwinding)), parts.brake(robot)
+
+
 class EscapingByJoints(Stage):
-    """Moving the tool clear of the canes by the arm's joints, after the straight way has failed. The base rests."""
+    """Moving the tool clear of the canes, or the arm home, by the arm's joints. The base rests."""
 
     phase: m.Phase = "RETREAT"
     yields = True
@@ -1147,7 +1173,7 @@ class CutSequence:
         """Start with getting the tool clear of the canes."""
         # Since a plan was made the robot may have been moved by hand.
         self._parts.next_cut.forget()
-        self._stage = Escape(self._parts)
+        self._stage = Escape(self._parts, unwinds=False)
 
     def survey(self, distance: float = 0.0, place: m.UndecidedSite | None = None) -> None:
         """Start a survey of this length (m), or of one site."""

@@ -171,6 +171,8 @@ _SHOULDER_HEIGHT = 0.333
 _STRAY = 0.05
 _GOOD_MARGIN, _GOOD_OMEGA = 0.25, 0.035
 _LEAST_MARGIN, _LEAST_OMEGA = 0.08, 0.012
+#: A way by joints that brings the tool nearer to the row by less than this leads away from it (m).
+_NO_NEARER = 0.005
 _ITERATIONS, _LARGEST_STEP, _PULL = 45, 0.25, 0.02
 _DAMPING = np.eye(6) * 1e-4
 
@@ -550,10 +552,24 @@ class PostureSearch:
                 return found.q
         return None
 
+    def tenable(self, q: Array) -> bool:
+        """Whether an arm (of 12) is as far from joint limits and singularities as that of every plan."""
+        reached = self._posture(q, self._robot.kinematics(q).J[:, ARM_Q])
+        return reached.margin >= _LEAST_MARGIN and reached.omega >= _LEAST_OMEGA
+
+    def leads_away(self, q: Array, goal: Array, frame: MapFrame) -> bool:
+        """Whether the tool comes no nearer to the row while the joints go from one configuration to another (12)."""
+        depth = [float(frame.position_in_map(place) @ self._left) for place in self._way(q, goal)]
+        return max(depth) <= depth[0] + _NO_NEARER
+
+    def _way(self, q: Array, goal: Array) -> Array:
+        """Places of the tool (N×3, m) while the joints go from one configuration to another."""
+        shares = np.linspace(0.0, 1.0, 11)
+        return np.array([self._robot.kinematics(q + share * (goal - q)).T_odom_tool.translation for share in shares])
+
     def _strays(self, q: Array, goal: Array) -> float:
         """How far the tool comes off a straight line while the joints go from one configuration to another (m)."""
-        shares = np.linspace(0.0, 1.0, 11)
-        way = np.array([self._robot.kinematics(q + share * (goal - q)).T_odom_tool.translation for share in shares])
+        way = self._way(q, goal)
         line = (way[-1] - way[0]) / max(float(np.linalg.norm(way[-1] - way[0])), 1e-9)
         return float(np.linalg.norm(way - way[0] - np.outer((way - way[0]) @ line, line), axis=1).max())
 
@@ -579,7 +595,6 @@ class PostureSearch:
     def _solve(self, q: Array, goal: Any, posture: Array) -> Generator[None, None, _Posture | None]:
         """Damped least squares for the arm alone, inside its limits, pulled towards `posture` in the null space."""
         q = q.copy()
-        limits = self._robot.limits
         for _ in range(_ITERATIONS):
             k = self._robot.kinematics(q)
             error = np.empty(6)
@@ -587,9 +602,7 @@ class PostureSearch:
             error[3:] = pin.log3(goal.rotation @ k.T_odom_tool.rotation.T)
             J = k.J[:, ARM_Q]
             if float(np.abs(error[:3]).max()) < 2e-4 and float(np.abs(error[3:]).max()) < 2e-3:
-                arm = q[ARM_Q]
-                margin = float(np.minimum(arm - limits.lower[ARM_Q], limits.upper[ARM_Q] - arm).min())
-                return _Posture(q, margin, float(np.sqrt(max(np.linalg.det(J @ J.T), 0.0))))
+                return self._posture(q, J)
             pull = _PULL * (posture - q[ARM_Q])
             step = pull + J.T @ np.linalg.solve(J @ J.T + _DAMPING, error - J @ pull)
             largest = float(np.abs(step).max())
@@ -598,6 +611,12 @@ class PostureSearch:
             q[ARM_Q] = np.clip(q[ARM_Q] + step, self._lower, self._upper)
             yield
         return None
+
+    def _posture(self, q: Array, J: Array) -> _Posture:
+        """A configuration (12) with its arm's distance from limits and singularities, by its Jacobian (6×7)."""
+        arm, limits = q[ARM_Q], self._robot.limits
+        margin = float(np.minimum(arm - limits.lower[ARM_Q], limits.upper[ARM_Q] - arm).min())
+        return _Posture(q, margin, float(np.sqrt(max(np.linalg.det(J @ J.T), 0.0))))
 
 
 def _quality(plan: CutPlan) -> float:
