@@ -44,7 +44,7 @@ def draw_vine(folder: Path, figure: Figure) -> None:
             name = condition(*grown, run["review"], run["decision_s"], run.get("method", OURS))
             groups.setdefault(name, []).append(run["stages"])
     sizes = [len(own) for own in groups.values()]
-    figure.set_size_inches(8.0, 1.2 + 0.22 * sum(sizes) + 0.35 * len(sizes))
+    figure.set_size_inches(8.0, 1.2 + 0.11 * sum(sizes) + 0.35 * len(sizes))
     panels = figure.subplots(len(groups), 1, sharex=True, squeeze=False, height_ratios=sizes).ravel()
     for panel, (name, own) in zip(panels, groups.items(), strict=True):
         left = [0.0] * len(own)
