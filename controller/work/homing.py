@@ -114,6 +114,6 @@ class Withdrawal:
         return tracking
 
     def missed(self, goal: reasons.Goal, robot: Measured) -> Reason:
-        """The remaining error of the joints on the way to `goal`, and what has held them."""
+        """By how much a joint missed `goal`, and what held the arm."""
         off = float(abs(robot.q[ARM_Q] - self._goal).max())
         return reasons.joints_not_reached(goal, float(np.degrees(off)), self._held_by)

@@ -193,8 +193,8 @@ def _spur(view: View, cloud: Array, cordon: cKDTree | None, canes: list[Cane], i
 def _of_stub(view: View, cloud: Array) -> Array:
     """The points of a spur that are on its stub (N×3, m, odom); all of them where hardly any is.
 
-    At the edge of wood the depth camera tells distances between the wood and what is behind it. A few such points,
-    far behind a stub, turn its principal axis.
+    Others are mixed pixels: at the edge of wood, with a depth between wood and background. A few of them, far behind a
+    stub, turn its principal axis.
     """
     depth = (cloud - view.t) @ view.R[:, 2]
     wood = cloud[np.abs(depth - np.median(depth)) < _STUB_DEPTH]

@@ -54,7 +54,7 @@ def test_an_old_cut_by_itself_is_no_spur() -> None:
 def test_a_stub_is_measured_by_its_wood_and_not_by_what_the_camera_mixed_with_the_background(
     behind: float, share: float
 ) -> None:
-    """At the edge of wood a depth camera tells distances between the wood and what is behind it."""
+    """Mixed pixels, at the edge of wood, have a depth between wood and background."""
     seen = vine("spur")
     assert seen.labels is not None
     rows, cols = np.nonzero(seen.labels == KIND("spur"))

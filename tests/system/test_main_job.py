@@ -29,13 +29,16 @@ def arm_and_accept(page: Page, *places: int) -> list[str]:
     return chosen
 
 
-def start(page: Page, robot: LiveRobot, condition: Callable[[], object], what: str) -> None:
+def start(page: Page, robot: LiveRobot, condition: Callable[[], object], what: str, mouse_stays: bool = False) -> None:
     """Start the work and wait for `condition()`, with nobody there to help should it stop by itself.
 
-    The mouse stays where it is: a browser that draws in software takes seconds to move it.
+    With `mouse_stays` the mouse is not moved to Start: a browser that draws in software takes seconds to move it.
     """
-    page.wait_for_selector('#start[aria-disabled="false"]')
-    page.dispatch_event("#start", "click")
+    if mouse_stays:
+        page.wait_for_selector('#start[aria-disabled="false"]')
+        page.dispatch_event("#start", "click")
+    else:
+        page.click("#start")
     robot.wait(lambda: robot.mode() == "AUTO", 10, "the work to start")
 
     def met() -> bool:
@@ -95,7 +98,7 @@ def stop_in_mid_approach(page: Page, robot: LiveRobot, stop: Press) -> float | N
     None where the base had arrived before the press: the browser's mouse may come late to it.
     """
     stop.reach()
-    start(page, robot, robot.driving, "the base to drive")
+    start(page, robot, robot.driving, "the base to drive", mouse_stays=True)
     pressed = stop.press()
     page.wait_for_selector('#mode[data-mode="ESTOP_LATCHED"]', timeout=20_000)
     assert robot.state()["bridge"]["stop_id"]
