@@ -27,7 +27,7 @@ from benchmarks.control.row_stages import StageClock
 from benchmarks.control.row_supervisor import Supervisor
 from benchmarks.control.row_walk import walk
 from benchmarks.control.stops import stops_of
-from benchmarks.peers.reactive import in_rows
+from benchmarks.peers.rows import PEERS, use_peers
 from benchmarks.perception.blocked import Blocker, blocked_by
 from bridge.sim.robot import trace
 from bridge.sim.robot.robot import SimulatedRobot
@@ -61,8 +61,6 @@ _AFTER_S = 3.0
 _OF_POINT = 0.06
 #: Periods between two looks at what touches a cane.
 _LOOK_EVERY = 4
-#: Controllers of others that can work off a row.
-PEERS = ("pink", "mink")
 
 
 def cut_row(
@@ -353,11 +351,6 @@ def _work(loop: ClosedLoop, todo: list[str], person: Supervisor | None) -> dict[
         begin += person.waited_s - waited
     loop.run(_AFTER_S)
     return durations
-
-
-def use_peers(methods: Collection[str]) -> None:
-    """Let the controller use those of others' controllers that are among the methods."""
-    METHODS.update({name: in_rows(name) for name in PEERS if name in methods})
 
 
 def main(argv: Sequence[str]) -> int:

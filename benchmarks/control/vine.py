@@ -22,13 +22,14 @@ from benchmarks.common.documents import bench_parser, write
 from benchmarks.common.intervals import Figure, quantile, share
 from benchmarks.control.cane_touches import CaneTouches
 from benchmarks.control.cut_truth import OLD_CANE, WantedCut, true_cut, wanted_cuts
-from benchmarks.control.row import PEERS, check_camera, codes, judged_cuts, named, row_of, sim_config, use_peers
+from benchmarks.control.row import check_camera, codes, judged_cuts, named, row_of, sim_config
 from benchmarks.control.row_report import Cut
 from benchmarks.control.row_stages import STAGES, StageClock
 from benchmarks.control.row_supervisor import GONE_S, LOOK_S
 from benchmarks.control.row_walk import USER, go_on, place
 from benchmarks.control.stops import stops_of
 from benchmarks.control.world import calibrated
+from benchmarks.peers.rows import PEERS, use_peers
 from benchmarks.perception.blocked import Blocker, blocked_by
 from benchmarks.perception.judge import nearest_rod
 from bridge.sim.robot import trace

@@ -5,8 +5,12 @@ error to the goal, what the arm's manipulability is short of a good one, velocit
 joint positions and accelerations are bounded, as far as one iteration of the solver keeps bounds. Towards the goal
 manipulability gives way to the tool. Weights, horizon and the form of the costs are ours. It knows no obstacles. The
 model's functions are written in Python, so that its time is not comparable with theirs in C++.
+
+With one goal it goes there in its own way. In rows it follows a motion: each knot wants the tool where the motion has
+it then, and base and arm near the motion's posture.
 """
 
+import math
 import time
 from typing import Any
 
@@ -16,7 +20,8 @@ import pinocchio as pin
 from controller.config import WholeBodyConfig
 from controller.whole_body.actuation import Actuation
 from controller.whole_body.manipulability import ArmManipulability
-from controller.whole_body.task import IkProblem, Solution
+from controller.whole_body.saturation import Saturation
+from controller.whole_body.task import ActuatorTask, IkProblem, Solution, ToolTask
 from rolling_panda.errors import RollingPandaError
 from rolling_panda.model.differential_drive import NQ, NXI, Array
 from rolling_panda.model.robot import ARM_Q, ARM_XI, RobotModel
@@ -31,6 +36,10 @@ _PLACE, _TURNING, _LAST, _SPEED, _EFFORT = 100.0, 30.0, 10.0, 1e-2, 1e-2
 #: Cost of what the arm's manipulability is short of a good one, as a share of that one; and the distance of the tool
 #: from its goal (m) below which it costs less, down to nothing at the goal, where it would hold the tool off.
 _MANIPULABILITY, _GOOD_OMEGA, _NEAR = 3.0, 0.15, 0.3
+#: Following a motion: cost of base and arm away from its posture (1/m², 1/rad²), and factor of the tool's costs.
+_POSTURE, _FIRM = 0.03, 10.0
+#: Factor of the base's speed cost where the base is held.
+_HELD = 1e4
 #: Entries of the state: base pose and arm joints, then ν.
 _POSES, _NX = 10, 10 + NXI
 
@@ -64,6 +73,7 @@ class Predictive:
         #: The action models of the knots, and of the last one.
         self.running = [_model(crocoddyl, RobotModel(), config, manipulability, last=False) for _ in range(_KNOTS)]
         self.last = _model(crocoddyl, RobotModel(), config, manipulability, last=True)
+        self._knots = [*self.running, self.last]
         self._greatest = self.last.acceleration
         self._fastest = self.last.velocity
         #: Processor time of each of the solver's turns (s).
@@ -74,22 +84,30 @@ class Predictive:
 
     def aim(self, T_odom_goal: Any, free_axis: bool) -> None:
         """Begin a motion to a tool pose (pin.SE3); see `Aimed`."""
-        for model in (*self.running, self.last):
+        for model in self._knots:
             model.aim(T_odom_goal, free_axis)
-        self._states, self._inputs, self.seconds = [], [], []
+        self.seconds = []
+        self._forget()
+
+    def _forget(self) -> None:
+        self._states, self._inputs = [], []
         self._since = _TURN
 
     def solve(self, problem: IkProblem) -> Solution:
         """The actuator velocities of the newest plan; see `Method.solve`. The problem's twist is not used."""
         nu = self._actuation.nu(problem.sent)
-        if self._since >= _TURN - 0.5 * self._dt:
-            place = problem.kinematics.T_odom_tool.translation
-            self._plan(np.concatenate([problem.q[:3], problem.q[ARM_Q], nu]), place)
+        if self._due:
+            self._plan(np.concatenate([_pose(problem.q), nu]), problem.kinematics.T_odom_tool.translation)
             self._since = 0.0
         self._since += self._dt
         change = np.clip(self._inputs[0], -self._greatest, self._greatest) * self._dt
         xi = self._actuation.xi(np.clip(nu + change, -self._fastest, self._fastest))
         return Solution(xi, 1.0, self._manipulability.at(problem.kinematics.J).value)
+
+    @property
+    def _due(self) -> bool:
+        """Whether it plans in this period."""
+        return self._since >= _TURN - 0.5 * self._dt
 
     def _plan(self, x: Array, place: Array) -> None:
         began = time.thread_time()
@@ -100,7 +118,7 @@ class Predictive:
             self._states, self._inputs = [x.copy() for _ in range(_KNOTS + 1)], [np.zeros(NXI) for _ in range(_KNOTS)]
         self._states[0] = x
         distance = float(np.linalg.norm(self.last.goal.translation - place))
-        for model in (*self.running, self.last):
+        for model in self._knots:
             model.lean(distance)
         solver.solve(self._states, self._inputs, _ITERATIONS)
         found = [np.array(u) for u in solver.us]
@@ -109,6 +127,58 @@ class Predictive:
         else:
             self._states, self._inputs = [x.copy() for _ in range(_KNOTS + 1)], [np.zeros(NXI) for _ in range(_KNOTS)]
         self.seconds.append(time.thread_time() - began)
+
+
+class Following(Predictive):
+    """The same in rows: it follows a motion, within all limits, with a base that may be held."""
+
+    def __init__(self, robot: RobotModel, config: WholeBodyConfig, dt: float) -> None:
+        """Build the problem for a control period of `dt` (s)."""
+        super().__init__(robot, config, dt)
+        self._saturation = Saturation(robot, config, dt)
+        self._end: Any = None
+
+    def solve(self, problem: IkProblem) -> Solution:
+        """The actuator velocities of the newest plan; see `Method.solve`."""
+        if isinstance(problem.tool, ActuatorTask):
+            self._end = None
+            wanted = problem.tool.xi
+        else:
+            self._follow(problem, problem.tool)
+            wanted = super().solve(problem).xi
+            if problem.arm_only:
+                wanted[:2] = 0.0 if problem.base == "frozen" else problem.sent[:2]
+        limited = self._saturation.apply(wanted, problem.q, problem.sent)
+        omega = self._manipulability.at(problem.kinematics.J).value
+        return Solution(limited.xi, limited.scale, omega, not limited.braked, "a limit" if limited.braked else "")
+
+    def _follow(self, problem: IkProblem, task: ToolTask) -> None:
+        """Let each knot aim at where the motion has the tool then, with base and arm near the motion's posture.
+
+        A motion with another end is another one, and what was planned for the last is forgotten.
+        """
+        T, ahead = problem.kinematics.T_odom_tool, task.ahead
+
+        def along(seconds: float) -> Any:
+            turn = pin.exp3(seconds * task.twist[3:])
+            return pin.SE3(turn @ T.rotation, T.translation + seconds * task.twist[:3])
+
+        if ahead is None:
+            ahead, self._end = along, None
+        elif self._end is None or not ahead(math.inf).isApprox(self._end):
+            self._end = ahead(math.inf)
+            self._forget()
+        if not self._due:
+            return
+        posture = _pose(problem.posture.q)
+        for number, model in enumerate(self._knots):
+            model.aim(ahead(number * _STEP), task.free_axis)
+            model.stay(posture, problem.arm_only)
+
+
+def _pose(q: Array) -> Array:
+    """Base pose and arm joints (10) of a configuration (12)."""
+    return np.concatenate([q[:3], q[ARM_Q]])
 
 
 def _model(crocoddyl: Any, robot: RobotModel, config: WholeBodyConfig, manipulability: float, last: bool) -> Any:
@@ -121,7 +191,7 @@ def _model(crocoddyl: Any, robot: RobotModel, config: WholeBodyConfig, manipulab
     bounds = 7 + NXI + (0 if last else NXI)
     speed_cost, effort_cost = _SPEED / velocity**2, _EFFORT / acceleration**2
     # What does not depend on the state: second derivatives, and derivatives of joints, velocities and input.
-    Lxx, Luu = np.diag(np.concatenate([np.zeros(_POSES), speed_cost])), np.diag(effort_cost)
+    Luu = np.diag(effort_cost)
     Gx, Gu = np.zeros((bounds, _NX)), np.zeros((bounds, NXI))
     Gx[:7, 3:_POSES], Gx[7 : 7 + NXI, _POSES:] = np.eye(7), np.eye(NXI)
     if not last:
@@ -136,6 +206,7 @@ def _model(crocoddyl: Any, robot: RobotModel, config: WholeBodyConfig, manipulab
             state = crocoddyl.StateVector(_NX)
             super().__init__(state, 0 if last else NXI, 7, bounds, 0)
             self.velocity, self.acceleration = velocity, acceleration
+            self.posture, self.pull, self.speed = np.zeros(_POSES), 0.0, speed_cost
             self.aim(pin.SE3.Identity(), False)
             lower = [limits.lower[ARM_Q] + config.joint_margin, -velocity]
             upper = [limits.upper[ARM_Q] - config.joint_margin, velocity]
@@ -153,6 +224,14 @@ def _model(crocoddyl: Any, robot: RobotModel, config: WholeBodyConfig, manipulab
             self.seen = np.full(_POSES, np.nan)
             self.found: tuple[Array, Array] = (np.zeros(7), np.zeros((7, _POSES)))
 
+        def stay(self, posture: Array, base_held: bool) -> None:
+            """Keep to a motion: base and arm (10) near its posture, the base at rest where it is held."""
+            self.weights[:6] *= _FIRM
+            self.posture, self.pull = posture, _POSTURE
+            self.speed = speed_cost.copy()
+            if base_held:
+                self.speed[:2] *= _HELD
+
         def lean(self, distance: float) -> None:
             """Weigh manipulability for a tool so far from its goal (m)."""
             self.weights[6] = (1.0 if last else _STEP) * manipulability * min(1.0, distance / _NEAR)
@@ -160,7 +239,8 @@ def _model(crocoddyl: Any, robot: RobotModel, config: WholeBodyConfig, manipulab
         def calc(self, data: Any, x: Array, u: Array | None = None) -> None:
             r, _ = self._residuals(x)
             nu = x[_POSES:]
-            data.cost = 0.5 * float(self.weights @ (r * r) + speed_cost @ (nu * nu))
+            away = x[:_POSES] - self.posture
+            data.cost = 0.5 * float(self.weights @ (r * r) + self.speed @ (nu * nu) + self.pull * away @ away)
             if u is None or last:
                 data.xnext = x
                 data.g = x[3:]
@@ -180,9 +260,10 @@ def _model(crocoddyl: Any, robot: RobotModel, config: WholeBodyConfig, manipulab
             r, J = self._residuals(x)
             nu = x[_POSES:]
             weighted = J.T * self.weights
-            second = Lxx.copy()
-            second[:_POSES, :_POSES] = weighted @ J
-            data.Lx, data.Lxx = np.concatenate([weighted @ r, speed_cost * nu]), second
+            second = np.diag(np.concatenate([np.full(_POSES, self.pull), self.speed]))
+            second[:_POSES, :_POSES] += weighted @ J
+            away = self.pull * (x[:_POSES] - self.posture)
+            data.Lx, data.Lxx = np.concatenate([weighted @ r + away, self.speed * nu]), second
             data.Gx = Gx
             if u is None or last:
                 return

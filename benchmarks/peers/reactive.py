@@ -7,7 +7,6 @@ time, as it does for the method `nullspace`. None of them knows obstacles or the
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from functools import partial
 from typing import Any, Protocol
 
 import daqp
@@ -19,7 +18,6 @@ from controller.config import WholeBodyConfig
 from controller.motion.follower import tool_error
 from controller.whole_body.actuation import Actuation
 from controller.whole_body.manipulability import ArmManipulability
-from controller.whole_body.registry import Maker, with_speed_scaling
 from controller.whole_body.saturation import Saturation
 from controller.whole_body.task import ActuatorTask, IkProblem, Method, Solution, ToolTask
 from rolling_panda.errors import RollingPandaError
@@ -50,7 +48,7 @@ class _Peer(ABC):
         self._robot, self._dt = robot, dt
         self._saturation = Saturation(robot, config, dt)
         self._manipulability = ArmManipulability()
-        self._goal: Any = pin.SE3.Identity()
+        self._goal: Any = None
 
     def aim(self, T_odom_goal: Any, free_axis: bool) -> None:
         """Where the motion that begins now is to end; see `Aimed`."""
@@ -187,7 +185,8 @@ class Holistic(_Peer):
     Over ν = [v, φ̇, q̇] and a slack δ (6) of the tool's twist: ½ xᵀ Q x + cᵀ x subject to J ν + δ = twist, velocity
     dampers at the joint limits, and limits of velocity and, which is ours, of acceleration. The base costs the more the
     nearer the tool is, the slack too; c has the gradient of the arm's manipulability and turns the base to face the
-    tool. It knows no free axis, and counts as arrived within 20 mm.
+    tool. It knows no free axis, and counts as arrived within 20 mm. Where it is not aimed, as in rows, the twist is the
+    motion's, and its goal the motion's end.
     """
 
     name = "holistic"
@@ -216,10 +215,18 @@ class Holistic(_Peer):
         self._step = dt * np.concatenate([base, arm])
 
     def _wanted(self, problem: IkProblem) -> Array | None:
+        assert isinstance(problem.tool, ToolTask)
         T, count = problem.kinematics.T_odom_tool, NXI + 6
-        error = tool_error(T, self._goal)
-        if float(np.abs(error[:3]).max()) < self._THERE and float(np.abs(error[3:]).max()) < 10.0 * self._THERE:
+        goal = self._goal
+        if goal is None:
+            goal = T if problem.tool.ahead is None else problem.tool.ahead(math.inf)
+        error = tool_error(T, goal)
+        if self._goal is None:
+            twist = problem.tool.twist
+        elif float(np.abs(error[:3]).max()) < self._THERE and float(np.abs(error[3:]).max()) < 10.0 * self._THERE:
             return np.zeros(NXI)
+        else:
+            twist = self._SERVO * error
         # The distance that is left, in its own measure: the sum of the coordinates.
         left = max(self._LEAST, float(np.abs(error[:3]).sum()))
         Q = np.zeros((count, count))
@@ -242,7 +249,8 @@ class Holistic(_Peer):
         sent = self._actuation.nu(problem.sent)
         lower[:NXI] = np.minimum(np.maximum(lower[:NXI], sent - self._step), sent + self._step)
         upper[:NXI] = np.maximum(np.minimum(upper[:NXI], sent + self._step), sent - self._step)
-        twist = self._SERVO * error
+        if problem.arm_only:
+            lower[:2] = upper[:2] = 0.0 if problem.base == "frozen" else self._actuation.nu(problem.sent)[:2]
         sense = np.zeros(count + 6, dtype=np.int32)
         # Rows after the bounds are equalities.
         sense[count:] = 5
@@ -272,11 +280,6 @@ def reactive(name: str, robot: RobotModel, config: WholeBodyConfig, dt: float) -
         return _MAKERS[name](robot, config, dt)
     except ImportError as error:
         raise RollingPandaError(f"{name} is not installed ({error}); `make peers` installs it") from error
-
-
-def in_rows(name: str) -> Maker:
-    """A peer for the controller: like methods without inequalities of their own it is braked before obstacles."""
-    return with_speed_scaling(partial(reactive, name))
 
 
 def _turning(free: bool) -> Any:

@@ -90,7 +90,7 @@ class Follower:
                 robot.q,
                 robot.kinematics,
                 robot.sent,
-                ToolTask(self._twist(wanted, motion.scale, error, robot), motion.free_axis),
+                ToolTask(self._twist(wanted, motion.scale, error, robot), motion.free_axis, ahead=motion.ahead),
                 motion.posture(),
                 motion.base,
                 motion.cap(pose),

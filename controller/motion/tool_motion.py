@@ -376,14 +376,21 @@ class ToolMotion:
 
     def desired(self) -> ToolState:
         """Where the tool should be now, its twist and the rate of that."""
+        return self._state(self.time)
+
+    def ahead(self, seconds: float) -> Any:
+        """Where the tool should be so much later on the motion's clock (T_odom_tool, pin.SE3)."""
+        return self._state(min(self.time + seconds, self.duration)).T_odom_tool
+
+    def _state(self, time: float) -> ToolState:
         position, R = self._start.translation.copy(), np.array(self._start.rotation, order="C")
         twist, acceleration = np.zeros(6), np.zeros(6)
         for leg in self._legs:
-            if self.time <= leg.begin:
+            if time <= leg.begin:
                 break
-            leg.trajectory.add(self.time - leg.begin, position, R, twist, acceleration)
+            leg.trajectory.add(time - leg.begin, position, R, twist, acceleration)
         for made in self._corrections:
-            done = made.progress(self.time)
+            done = made.progress(time)
             position += done.s * made.by
             twist[:3] += done.rate * made.by
             acceleration[:3] += done.acceleration * made.by

@@ -1,7 +1,8 @@
 """Problem and solution of a whole-body method, and the interfaces of methods, guards and tasks."""
 
 import math
-from typing import ClassVar, Literal, Protocol
+from collections.abc import Callable
+from typing import Any, ClassVar, Literal, Protocol
 
 import numpy as np
 from msgspec import Struct, field
@@ -27,11 +28,14 @@ class ToolTask(Struct, frozen=True):
         free_axis: True leaves the rotation about the tool's y, the cane's axis, to the lower priorities.
         keep_path: True slows the whole twist if the limits do not allow its speed; False gives the nearest feasible
             twist.
+        ahead: Pose (T_odom_tool, pin.SE3) that the motion wants so many seconds later, at its end for infinity; None
+            for a twist alone. Of use to a method that looks ahead.
     """
 
     twist: Array
     free_axis: bool = False
     keep_path: bool = True
+    ahead: Callable[[float], Any] | None = None
 
 
 class ActuatorTask(Struct, frozen=True):

@@ -72,7 +72,7 @@ def _compensated(problem: IkProblem, wheels: Array) -> ToolTask | ActuatorTask:
         return tool
     twist = np.empty(6)
     _owed(problem.kinematics.J_xi, problem.sent, wheels, tool.twist, twist)
-    return ToolTask(twist, tool.free_axis, tool.keep_path)
+    return ToolTask(twist, tool.free_axis, tool.keep_path, tool.ahead)
 
 
 @compiled(NOTHING(MATRIX, VECTOR, VECTOR, VECTOR, VECTOR))

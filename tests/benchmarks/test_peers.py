@@ -1,15 +1,18 @@
 """Others' controllers and planners, which `make peers` installs."""
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from benchmarks.control import approach, reach
 from benchmarks.control.plan_limits import plan_limits
 from benchmarks.control.reach_run import DT, bench_config
 from benchmarks.control.reach_targets import HOME, draw
-from benchmarks.peers.predictive import Predictive
+from benchmarks.peers.predictive import Following, Predictive
 from benchmarks.peers.reactive import reactive
 from benchmarks.peers.sampling import OMPL, OmplPlanner
+from controller.motion.follower import Follower, Measured
+from controller.motion.tool_motion import Leg, ToolMotion
 from controller.whole_body.actuation import Actuation
 from controller.whole_body.collision import CollisionModel
 from controller.whole_body.manipulability import arm_omega
@@ -23,7 +26,7 @@ POST = Obstacle("post", "post", (0.55, 0.0, 0.0), (0.55, 0.0, 2.0), 0.05)
 LEFT, RIGHT = np.array([1.0, 0.6, 0.0, -1.5, 0.0, 2.1, 0.8]), np.array([-1.0, 0.6, 0.0, -1.5, 0.0, 2.1, 0.8])
 
 
-@pytest.mark.parametrize("name", ["pink", "mink"])
+@pytest.mark.parametrize("name", ["pink", "mink", "holistic"])
 def test_a_peer_follows_a_twist_within_the_limits_and_leaves_frozen_wheels_alone(name):
     config = bench_config("hierarchy").whole_body
     method = reactive(name, ROBOT, config, 0.01)
@@ -78,7 +81,30 @@ def test_holistic_turns_the_base_to_face_the_tool():
     assert Actuation(ROBOT.drive).nu(xi)[1] > 0.01
 
 
-def test_the_costs_of_mpc_have_exact_derivatives():
+@pytest.mark.parametrize("frozen", [False, True])
+def test_mpc_follows_a_motion_in_rows_with_the_base_where_it_should_be(frozen):
+    config = bench_config("mpc")
+    q, xi = draw(41, 1, "none", goals="row")[0].q, np.zeros(9)
+    T, q_goal = ROBOT.pose(q, ROBOT.tool_id), q.copy()
+    shift = np.array([0.0, 0.0, 0.08]) if frozen else 0.15 * np.array([np.cos(q[2]), np.sin(q[2]), 0.0])
+    q_goal[:3] += 0.0 if frozen else shift
+    leg = Leg(pin.SE3(T.rotation, T.translation + shift), q_goal, 0.3, frozen_within=9.0 if frozen else 0.0)
+    motion = ToolMotion(config.motion, config.whole_body, T, q, [leg])
+    follower, errors, begin = Follower(config.motion, Following(RobotModel(), config.whole_body, DT), DT), [], q[:2]
+    for _ in range(int((motion.duration + 1.0) / DT)):
+        tracking = follower.follow(motion, Measured(q, ROBOT.kinematics(q), xi))
+        xi, q = tracking.xi, q.copy()
+        errors.append(tracking.position_error)
+        q[:3] = ROBOT.drive.integrate(q[:3], float(xi[0] * DT), float(xi[1] * DT))
+        q[3:] += xi * DT
+    assert max(errors) < 0.015
+    assert errors[-1] < 2e-3 and tracking.rotation_error < np.radians(0.2)
+    driven = float(np.linalg.norm(q[:2] - begin))
+    assert driven == 0.0 if frozen else 0.1 < driven < 0.17
+
+
+@pytest.mark.parametrize("follows", [False, True])
+def test_the_costs_of_mpc_have_exact_derivatives(follows):
     method = Predictive(ROBOT, bench_config("mpc").whole_body, DT)
     target = draw(0, 1, "none")[0]
     method.aim(target.T_odom_goal, True)
@@ -87,6 +113,8 @@ def test_the_costs_of_mpc_have_exact_derivatives():
     u = rng.normal(size=9)
     for knot in (method.running[0], method.last):
         knot.lean(1.0)
+        if follows:
+            knot.stay(x[:10] + 0.1 * rng.normal(size=10), True)
         data = knot.createData()
         knot.calc(data, x, u)
         knot.calcDiff(data, x, u)

@@ -57,6 +57,16 @@ def test_the_twist_is_the_rate_of_the_pose_also_round_corners(corners, share):
     np.testing.assert_allclose(now.twist[3:], turned, atol=1e-4)
 
 
+@given(st.lists(st.tuples(places, turns), min_size=2, max_size=4), st.floats(0.0, 1.0), st.floats(0.0, 5.0))
+def test_what_lies_ahead_is_what_will_be_wanted_then_and_the_goal_after_the_end(corners, share, seconds):
+    path = motion([pose(*corner) for corner in corners])
+    path.advance(1.0, share * path.duration)
+    ahead, end = path.ahead(seconds), path.ahead(math.inf)
+    path.advance(1.0, min(seconds, path.duration - path.time))
+    assert ahead.isApprox(path.desired().T_odom_tool, 1e-9)
+    assert end.isApprox(path.goal, 1e-9)
+
+
 @given(st.lists(st.tuples(places, turns), min_size=3, max_size=4), st.floats(0.02, 0.98))
 def test_the_acceleration_is_the_rate_of_the_twist_also_round_corners(corners, share):
     path, dt = motion([pose(*corner) for corner in corners]), 1e-5
