@@ -7,10 +7,12 @@ import numpy as np
 
 from rolling_panda import messages as m
 from rolling_panda.messages.page import CameraPreset, Layer, Measured, PagePoints
+from rolling_panda.messages.perception import Scenery
 from rolling_panda.messages.supervision import ArmAngles
 from rolling_panda.model.differential_drive import Array
 from rolling_panda.model.robot import ARM_Q
 from rolling_panda.model.wire_values import vector3
+from rolling_panda.transport.inbox import Received
 from server.auth.sessions import Session
 from server.robots.link import RobotLink
 from server.robots.page_view import PageView
@@ -31,7 +33,10 @@ class SceneUpdater:
         self._points: object = None
         self._camera_sequence = 0
         self._obstacles: object = None
-        self._scenery: object = None
+        self._scenery: Received[Scenery] | None = None
+        #: The motion of the last update, and the last one of a row that is not there any more.
+        self._motion: object = None
+        self._old_motion: object = None
 
     def place_camera(self, session: Session, preset: CameraPreset) -> None:
         """Move the cameras of this session's views to a preset, once the robot's posture is known."""
@@ -82,9 +87,12 @@ class SceneUpdater:
         if (preview := link.preview_motion.peek()) is not None:
             scene.ghost.set_motion(preview.message)
         if (scenery := link.scenery.peek()) is not None and scenery is not self._scenery:
+            if self._scenery is not None and _another_row(self._scenery.message, scenery.message):
+                self._old_motion = self._motion
             self._scenery = scenery
             scene.show_row(scenery.message, now)
-        if (motion := link.scenery_motion.peek()) is not None and scene.shows_row:
+        self._motion = motion = link.scenery_motion.peek()
+        if motion is not None and motion is not self._old_motion and scene.shows_row:
             scene.show_row_motion(motion.message)
         if (obstacles := link.obstacles.peek()) is not None and obstacles is not self._obstacles:
             self._obstacles = obstacles
@@ -104,3 +112,8 @@ class SceneUpdater:
         if decoded is not None:
             pose = self._view.camera(frame)
             self._scene.show_camera_frame(decoded, np.array(quat_wxyz(pose.quat_xyzw)), np.array(pose.position))
+
+
+def _another_row(before: Scenery, now: Scenery) -> bool:
+    """Whether the row is not the one before with more of it cut: a bridge that starts again counts anew."""
+    return now.revision <= before.revision and now.capsules != before.capsules

@@ -145,6 +145,35 @@ def test_swaying_canes_are_sent_only_while_a_view_shows_the_simulated_row(server
         hear(view, of_motion)
 
 
+def test_what_swayed_in_another_row_does_not_sway_in_a_new_one(server):
+    def row(x):
+        return Scenery(
+            header=m.Header(), revision=0, capsules=(Capsule("cane", (x, 0.8, 0.5), (x, 0.8, 1.0), 5e-3, 5e-3),)
+        )
+
+    def sways(x):
+        moved = (MovedCapsule(0, (x, 0.8, 0.5), (x + 0.02, 0.8, 1.0)),)
+        return SceneryMotion(header=m.Header(), revision=0, moved=moved)
+
+    def of_motion(message):
+        return message.get("name") == "/row/moved cane" and message["type"] != "RemoveSceneNodeMessage"
+
+    def removed(message):
+        return message.get("name") == "/row/moved cane" and message["type"] == "RemoveSceneNodeMessage"
+
+    server.wire.deliver(topics.SCENERY, row(2.2))
+    server.wire.deliver(topics.SCENERY_MOTION, sways(2.2))
+    with page_and_view(server) as (page, view):
+        page.send('{"type":"ShowLayers","layers":["simulated"]}')
+        hear(view, of_motion)
+        # The bridge has started again with another vineyard, and nothing has moved there yet.
+        server.wire.deliver(topics.SCENERY, row(3.2))
+        hear(view, removed)
+        never(view, of_motion)
+        server.wire.deliver(topics.SCENERY_MOTION, sways(3.2))
+        hear(view, of_motion)
+
+
 def test_a_drag_while_holding_does_not_wait_for_the_loops_turn_and_many_drags_are_not_all_told():
     wire = FakeWire()
     sent = wire.sent[topics.TELEOP.name]
