@@ -115,11 +115,20 @@ class Place:
     reason: str
 
 
-def condition(training: str, cultivar: str, preset: str, review: str, decision_s: float, method: str = OURS) -> str:
+def condition(
+    training: str,
+    cultivar: str,
+    preset: str,
+    review: str,
+    decision_s: float,
+    method: str = OURS,
+    glance_s: float = GLANCE_S,
+) -> str:
     """The words for the vines of one condition."""
     vine = training if cultivar == USUAL else f"{training}, {cultivar}"
     robot = "" if method == OURS else f"{method}: "
-    return f"{robot}{vine}, {preset}, {review} {decision_s:g} s"
+    look = "" if glance_s == GLANCE_S else f", a look {glance_s:g} s"
+    return f"{robot}{vine}, {preset}, {review} {decision_s:g} s{look}"
 
 
 @dataclass(frozen=True)
@@ -149,6 +158,7 @@ class VineRun:
         cultivar: How the vine grows: a preset of the vineyard.
         false_stops: Protective stops at which the robot touched nothing, by the truth.
         method: Whole-body method.
+        unsure: Accepted points that perception was not sure of; None in files of earlier versions.
     """
 
     seed: int
@@ -173,6 +183,7 @@ class VineRun:
     cultivar: str = USUAL
     false_stops: int = 0
     method: str = OURS
+    unsure: tuple[str, ...] | None = None
 
     @property
     def key(self) -> tuple[object, ...]:
@@ -183,7 +194,8 @@ class VineRun:
     @property
     def condition(self) -> str:
         """In words what it shares with the other vines of its figures."""
-        return condition(self.training, self.cultivar, self.preset, self.review, self.decision_s, self.method)
+        grown = self.training, self.cultivar, self.preset
+        return condition(*grown, self.review, self.decision_s, self.method, self.glance_s)
 
     def as_the_rule_says(self, with_room: bool = False) -> bool:
         """Whether every cut that the vine asks for was made where it is right, and nothing that stays was cut off.
@@ -225,6 +237,7 @@ class Reviewer:
         accepted: Entries of the accepted points, as they were accepted.
         refusals: Codes of refused acceptances, by point.
         left: Undecided places as they were when they were left; a cut beside one changes its reason.
+        unsure: Points that perception was not sure of when they were accepted last.
     """
 
     loop: ClosedLoop
@@ -237,6 +250,7 @@ class Reviewer:
     accepted: dict[str, m.QueueEntry] = field(default_factory=dict)
     refusals: dict[str, str] = field(default_factory=dict)
     left: list[m.UndecidedSite] = field(default_factory=list)
+    unsure: set[str] = field(default_factory=set)
     _asked: Counter[str] = field(default_factory=Counter)
 
     def decide(self) -> None:
@@ -307,6 +321,10 @@ class Reviewer:
             answer = self.loop.command(accept)
             if not answer.ok:
                 self.refusals[name] = codes(answer.reason)
+                continue
+            self.unsure.discard(name)
+            if shown.confidence < SURE:
+                self.unsure.add(name)
         self.loop.run(0.1)
         self.accepted |= {entry.point_id: entry for entry in self.loop.queue("ACCEPTED", "UNREACHABLE")}
 
@@ -568,6 +586,7 @@ def prune_vine(
         cultivar=cultivar,
         false_stops=sum(stop.false for stop in stops_of(events, record.rows)),
         method=method,
+        unsure=tuple(sorted(reviewer.unsure)),
     )
 
 
@@ -668,10 +687,16 @@ def summarise(runs: Sequence[VineRun]) -> dict[str, Figure]:
     cuts = [cut for run in runs for cut in run.cuts]
     made = [cut for cut in cuts if cut.right_cane or cut.harm]
     left = [run for run in runs if not run.ended]
+    told = [run for run in runs if run.unsure is not None]
+    sure = [cut for run in told for cut in run.cuts if cut.point_id not in (run.unsure or ())]
+    made_of_sure = [cut for cut in sure if cut.right_cane or cut.harm]
     return {
         **{outcome: share(sum(p.outcome == outcome for p in possible), len(possible)) for outcome in OUTCOMES},
         "blocked": share(len(asked) - len(possible), len(asked)),
         "harmed": share(sum(bool(cut.harm) for cut in cuts), len(cuts)),
+        "sure": share(len(sure), sum(len(run.cuts) for run in told)),
+        "harmed_of_sure": share(sum(bool(cut.harm) for cut in sure), len(sure)),
+        "right_of_sure_made": share(sum(cut.true_right for cut in made_of_sure), len(made_of_sure)),
         "vines_as_the_rule_says": share(sum(run.as_the_rule_says() for run in runs), len(runs)),
         "vines_with_room_as_ruled": share(sum(run.as_the_rule_says(with_room=True) for run in runs), len(runs)),
         "right_of_made": share(sum(cut.true_right for cut in made), len(made)),
@@ -745,6 +770,7 @@ def read(path: Path) -> list[VineRun]:
                     **row,
                     "cuts": tuple(Cut(**cut) for cut in row["cuts"]),
                     "places": tuple(Place(**place) for place in row["places"]),
+                    "unsure": None if row.get("unsure") is None else tuple(row["unsure"]),
                 }
             )
             for row in rows

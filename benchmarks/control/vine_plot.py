@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from benchmarks.control.row_plot import STAGE_COLOURS
 from benchmarks.control.row_stages import STAGES
-from benchmarks.control.vine import OURS, USUAL, condition
+from benchmarks.control.vine import GLANCE_S, OURS, USUAL, condition
 from rolling_panda.errors import InputError
 
 #: The person's decisions are hatched; the work has the colours of `bench row`.
@@ -41,7 +41,9 @@ def draw_vine(folder: Path, figure: Figure) -> None:
             raise InputError(f"{path} has no vines of `bench vine --json`; run it again")
         for run in document["results"]:
             grown = run["training"], run.get("cultivar", USUAL), run["preset"]
-            name = condition(*grown, run["review"], run["decision_s"], run.get("method", OURS))
+            name = condition(
+                *grown, run["review"], run["decision_s"], run.get("method", OURS), run.get("glance_s", GLANCE_S)
+            )
             groups.setdefault(name, []).append(run["stages"])
     sizes = [len(own) for own in groups.values()]
     figure.set_size_inches(8.0, 1.2 + 0.11 * sum(sizes) + 0.35 * len(sizes))

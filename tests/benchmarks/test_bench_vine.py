@@ -119,6 +119,7 @@ def test_sure_cuts_and_places_of_a_vine_take_three_presses_and_a_glance_each_and
     reviewer.decide()
     assert told(page) == ["a", "b", "place 4", "place 5", "c"]
     assert (reviewer.decisions, reviewer.glances) == (4, 4) and set(reviewer.accepted) == {"a", "b", "c"}
+    assert reviewer.unsure == {"c"}
     assert page.now == pytest.approx(4 * 2.0 + 4 * 0.5, abs=0.5)
 
 
@@ -331,6 +332,19 @@ def test_shares_are_of_the_cuts_with_room_and_seconds_of_the_vines_that_were_lef
     assert figures["machine_s_most"].value == 80.0 and figures["left_the_vine"].value == 0.75
     assert figures["both_s_median"].value == 20.0 + 4 * 3.0 + 2.0
     assert figures["person_10_s"].value == pytest.approx(1 / 3), "three decisions of three seconds are more than 10 s"
+
+
+def test_what_perception_was_sure_of_has_shares_of_its_own_where_that_was_told():
+    runs = [run(1, unsure=()), run(2, unsure=(), harm="a node"), run(3, unsure=("p",), harm="a node"), run(4)]
+    figures = bench.summarise(runs)
+    assert (figures["sure"].value, figures["sure"].n) == (pytest.approx(2 / 3), 3)
+    assert (figures["harmed_of_sure"].value, figures["harmed_of_sure"].n) == (0.5, 2)
+    assert figures["right_of_sure_made"].value == 0.5
+    assert figures["harmed"].value == 0.5 and bench.summarise([run(4)])["harmed_of_sure"].value is None
+
+
+def test_vines_with_another_time_for_a_look_are_figures_of_their_own():
+    assert run(glance_s=0.5).condition == "spur, calm, each 3 s, a look 0.5 s" != run().condition
 
 
 @pytest.mark.parametrize(
