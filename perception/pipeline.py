@@ -230,7 +230,7 @@ class Perception:
     def _survey(self, view: View, labels: Labels, plant: Plant) -> None:
         """Update plant map, points and obstacles from a survey frame and its plant, in map."""
         cylinders = self._obstacle_map.update(view, labels)
-        numbers = self._numbering.number(plant, view.R[:, 0])
+        plant, numbers = self._numbering.numbered(plant, view.R[:, 0])
         spurs = self.plant_map.update(plant, numbers)
         self._spur_pictures.add(view, plant, numbers)
         fused = {spur.number: spur.as_spur() for spur in self.plant_map.spurs} if self._config.fuse else {}

@@ -1,12 +1,17 @@
 """Vine and spur numbers that persist from frame to frame."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial.distance import cdist
 
 from perception.arrays import Array
-from perception.plant.model import Plant
+from perception.plant.model import Plant, Spur
 
+#: Distances across the row count less than those along it, as neighbouring spurs differ along it. Wood without canes
+#: is a piece of a spur within this multiple of the distance between spurs.
+_ACROSS, _BARE = 0.6, 1.5
 #: A position's mean covers this many observations.
 _WINDOW = 20
 
@@ -42,8 +47,11 @@ class SpurNumbering:
         self._trunks: list[_Trunk] = []
         self._sites: list[_Site] = []
 
-    def number(self, plant: Plant, along: Array) -> tuple[SpurNumber, ...]:
-        """Numbers of the plant's spurs, in their order.
+    def numbered(self, plant: Plant, along: Array) -> tuple[Plant, tuple[SpurNumber, ...]]:
+        """The plant with each spur once, and the numbers of its spurs in their order.
+
+        Hidden wood or lost depth divides a spur in some frames, and a piece of a cane is taken for one in others. What
+        is nearer to a spur than another spur would be is a piece of it: its canes are canes of that spur.
 
         Args:
             plant: Plant of one frame, with spurs in order along the row.
@@ -52,8 +60,13 @@ class SpurNumbering:
         for position in plant.trunks:
             if all(abs(float((position - t.position) @ along)) >= 0.3 * self._spacing for t in self._trunks):
                 self._trunks.append(_Trunk(position, self._vine(position, along)))
-        used: set[int] = set()
-        return tuple(self._site(spur.position, along, used) for spur in plant.spurs)
+        sites, owners = self._matched(plant.spurs, along)
+        spurs, numbers = [], []
+        for i, spur in enumerate(plant.spurs):
+            if owners[i] == i:
+                spurs.append(_whole(spur, [plant.spurs[k] for k, owner in owners.items() if owner == i and k != i]))
+                numbers.append(self._observe(spur.position, sites.get(i), along))
+        return replace(plant, spurs=tuple(spurs)), tuple(numbers)
 
     def _vine(self, position: Array, along: Array) -> int:
         """Vine with the nearest trunk along the row; vines out of view are counted by their spacing."""
@@ -62,17 +75,57 @@ class SpurNumbering:
         nearest = min(self._trunks, key=lambda trunk: abs(float((position - trunk.position) @ along)))
         return max(0, nearest.vine + round(float((position - nearest.position) @ along) / self._spacing))
 
-    def _site(self, position: Array, along: Array, used: set[int]) -> SpurNumber:
-        distances = np.linalg.norm(np.array([site.position for site in self._sites]).reshape(-1, 3) - position, axis=1)
-        distances[list(used)] = np.inf
-        k = int(np.argmin(distances)) if len(distances) else -1
-        if k >= 0 and distances[k] < self._separation:
-            site = self._sites[k]
-            site.count += 1
-            site.position = site.position + (position - site.position) / min(site.count, _WINDOW)
-        else:
-            vine, k = self._vine(position, along), len(self._sites)
+    def _matched(self, spurs: tuple[Spur, ...], along: Array) -> tuple[dict[int, int], dict[int, int | None]]:
+        """Which site each known spur of a frame is, and which spur each is a piece of.
+
+        Spurs are the sites that they are nearest to, all of them together, those with canes before others. Of the rest
+        those are pieces that are near one of these, and bare wood near a site is nothing.
+
+        Returns:
+            Index of the site by that of the spur; index of the whole spur by that of each, its own for a whole one and
+            None for nothing.
+        """
+        places = _upright([spur.position for spur in spurs], along)
+        known = cdist(places, _upright([site.position for site in self._sites], along))
+        bare = np.array([not spur.canes for spur in spurs], dtype=bool)
+        far = self._separation * np.where(bare, 2.0, 1.0)
+        cost = np.minimum(known + far[:, None] - self._separation, far[:, None])
+        pairs = zip(*linear_sum_assignment(cost), strict=True)
+        sites = {int(i): int(k) for i, k in pairs if known[i, k] < self._separation}
+        owners: dict[int, int | None] = {i: i for i in sites}
+        apart = cdist(places, places)
+        for i in sorted(set(range(len(spurs))) - set(sites), key=lambda i: -len(spurs[i].canes)):
+            nearest = min((k for k, owner in owners.items() if owner == k), key=lambda k: float(apart[i, k]), default=i)
+            reach = self._separation * (_BARE if bare[i] or bare[nearest] else 1.0)
+            if nearest != i and apart[i, nearest] < reach:
+                owners[i] = nearest
+            else:
+                owners[i] = None if bare[i] and known[i].min(initial=np.inf) < reach else i
+        return sites, owners
+
+    def _observe(self, position: Array, k: int | None, along: Array) -> SpurNumber:
+        """Add an observation to the site with this index, or a new site without one; returns its number."""
+        if k is None:
+            vine = self._vine(position, along)
             count = sum(site.number.vine == vine for site in self._sites)
             self._sites.append(_Site(position, 1, SpurNumber(vine, count + 1)))
-        used.add(k)
-        return self._sites[k].number
+            return self._sites[-1].number
+        site = self._sites[k]
+        site.count += 1
+        site.position = site.position + (position - site.position) / min(site.count, _WINDOW)
+        return site.number
+
+
+def _upright(positions: list[Array], along: Array) -> Array:
+    """Positions (N×3) with distances across the row shortened: spurs stand beside each other along it."""
+    out = np.array(positions).reshape(-1, 3)
+    return out - (1.0 - _ACROSS) * (out - (out @ along)[:, None] * along)
+
+
+def _whole(spur: Spur, pieces: list[Spur]) -> Spur:
+    """A spur with the canes of its pieces."""
+    if not pieces:
+        return spur
+    canes = sorted((cane for each in (spur, *pieces) for cane in each.canes), key=lambda cane: -cane.length)
+    incomplete = next((each.incomplete for each in (spur, *pieces) if each.incomplete is not None), None)
+    return replace(spur, canes=tuple(canes), incomplete=incomplete)

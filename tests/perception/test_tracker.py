@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 
 from perception.config import TrackerConfig
-from perception.plant.model import Plant, Spur
-from perception.plant.numbering import SpurNumber, SpurNumbering
+from perception.plant.numbering import SpurNumber
 from perception.rules.pruning import Cut
 from perception.segmentation.frame import View
 from perception.skeleton.fragments import CANE
@@ -360,22 +359,6 @@ def test_a_point_gives_way_as_soon_as_more_looks_put_the_cut_elsewhere():
     (second,) = elsewhere[-1].points
     assert second.point_id != first.point_id
     assert elsewhere[-1].withdrawn == (reasons.withdrawn_as_elsewhere(first.point_id, first.vine, first.spur),)
-
-
-def test_spurs_keep_their_numbers_while_the_robot_drives_on():
-    along = np.array([1.0, 0.0, 0.0])
-    rng = np.random.default_rng(1)
-
-    def plant(*xs):
-        spurs = tuple(Spur(np.array([x, 0.85, 0.95]) + rng.normal(0.0, 0.003, 3), None, 0.0, ()) for x in xs)
-        return Plant(spurs, np.array([[0.45, 0.85, 0.7]]), ())
-
-    numbers = SpurNumbering(CONFIG.spur_separation, CONFIG.vine_spacing)
-    first = numbers.number(plant(0.2, 0.32, 0.44), along)
-    assert first == (SpurNumber(1, 1), SpurNumber(1, 2), SpurNumber(1, 3))
-    for _ in range(10):
-        assert numbers.number(plant(0.32, 0.44, 0.6), along) == (*first[1:], SpurNumber(1, 4))
-    assert numbers.number(plant(2.2), along) == (SpurNumber(2, 1),)
 
 
 @pytest.mark.parametrize("distance", [0.12, 0.16, 0.20])
