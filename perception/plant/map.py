@@ -353,6 +353,16 @@ class PlantMap:
         """All spurs, vine by vine."""
         return tuple(spur for _, spur in sorted(self._spurs.items()))
 
+    def canes_above(self, arc: float, observations: int) -> Array:
+        """Points on the axes of canes that so many frames have shown, from an arc length (m) on (N×3, m, odom)."""
+        axes = [
+            cane.best.axis[cane.best.arc > arc]
+            for spur in self._spurs.values()
+            for cane in spur.canes
+            if cane.base.count >= observations
+        ]
+        return np.concatenate([np.zeros((0, 3)), *axes])
+
     def cane_lines(self) -> tuple[tuple[Vector3, ...], ...]:
         """The standing axis of each cane as a line for display (m, odom)."""
         return tuple(line for spur in self.spurs for cane in spur.canes if (line := cane.line()))

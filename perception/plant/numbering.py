@@ -12,6 +12,9 @@ from perception.plant.model import Plant, Spur
 #: Distances across the row count less than those along it, as neighbouring spurs differ along it. Wood without canes
 #: is a piece of a spur within this multiple of the distance between spurs.
 _ACROSS, _BARE = 0.6, 1.5
+#: Largest distance of wood on a cane from the axis of that cane (m).
+_ON_CANE = 0.015
+_NO_POINTS: Array = np.zeros((0, 3))
 #: A position's mean covers this many observations.
 _WINDOW = 20
 
@@ -47,20 +50,22 @@ class SpurNumbering:
         self._trunks: list[_Trunk] = []
         self._sites: list[_Site] = []
 
-    def numbered(self, plant: Plant, along: Array) -> tuple[Plant, tuple[SpurNumber, ...]]:
+    def numbered(self, plant: Plant, along: Array, canes: Array = _NO_POINTS) -> tuple[Plant, tuple[SpurNumber, ...]]:
         """The plant with each spur once, and the numbers of its spurs in their order.
 
         Hidden wood or lost depth divides a spur in some frames, and a piece of a cane is taken for one in others. What
-        is nearer to a spur than another spur would be is a piece of it: its canes are canes of that spur.
+        is nearer to a spur than another spur would be is a piece of it: its canes are canes of that spur. What is on a
+        known cane is no spur.
 
         Args:
             plant: Plant of one frame, with spurs in order along the row.
             along: Unit vector along the row (3, odom).
+            canes: Points on the axes of known canes, away from their spurs (N×3, odom).
         """
         for position in plant.trunks:
             if all(abs(float((position - t.position) @ along)) >= 0.3 * self._spacing for t in self._trunks):
                 self._trunks.append(_Trunk(position, self._vine(position, along)))
-        sites, owners = self._matched(plant.spurs, along)
+        sites, owners = self._matched(plant.spurs, along, canes)
         spurs, numbers = [], []
         for i, spur in enumerate(plant.spurs):
             if owners[i] == i:
@@ -75,11 +80,13 @@ class SpurNumbering:
         nearest = min(self._trunks, key=lambda trunk: abs(float((position - trunk.position) @ along)))
         return max(0, nearest.vine + round(float((position - nearest.position) @ along) / self._spacing))
 
-    def _matched(self, spurs: tuple[Spur, ...], along: Array) -> tuple[dict[int, int], dict[int, int | None]]:
+    def _matched(
+        self, spurs: tuple[Spur, ...], along: Array, canes: Array
+    ) -> tuple[dict[int, int], dict[int, int | None]]:
         """Which site each known spur of a frame is, and which spur each is a piece of.
 
         Spurs are the sites that they are nearest to, all of them together, those with canes before others. Of the rest
-        those are pieces that are near one of these, and bare wood near a site is nothing.
+        those are pieces that are near one of these. What is on a known cane is nothing, nor is bare wood near a site.
 
         Returns:
             Index of the site by that of the spur; index of the whole spur by that of each, its own for a whole one and
@@ -94,13 +101,15 @@ class SpurNumbering:
         sites = {int(i): int(k) for i, k in pairs if known[i, k] < self._separation}
         owners: dict[int, int | None] = {i: i for i in sites}
         apart = cdist(places, places)
+        on_cane = cdist(np.array([spur.position for spur in spurs]).reshape(-1, 3), canes).min(axis=1, initial=np.inf)
         for i in sorted(set(range(len(spurs))) - set(sites), key=lambda i: -len(spurs[i].canes)):
             nearest = min((k for k, owner in owners.items() if owner == k), key=lambda k: float(apart[i, k]), default=i)
             reach = self._separation * (_BARE if bare[i] or bare[nearest] else 1.0)
             if nearest != i and apart[i, nearest] < reach:
                 owners[i] = nearest
             else:
-                owners[i] = None if bare[i] and known[i].min(initial=np.inf) < reach else i
+                nothing = on_cane[i] < _ON_CANE or (bare[i] and known[i].min(initial=np.inf) < reach)
+                owners[i] = None if nothing else i
         return sites, owners
 
     def _observe(self, position: Array, k: int | None, along: Array) -> SpurNumber:
