@@ -73,8 +73,10 @@ _MIN_NORM = 1e-6
 _MIN_CORDON = 200
 #: A spur within this distance of the image centre, along the row, is in front of the camera (m).
 _IN_FRONT = 0.3
-#: Arc length of a cane beyond which nothing on it is a spur (m).
+#: Arc length of a cane beyond which what continues it is no spur (m).
 _ABOVE_SPUR = 0.04
+#: Canes of spurs within this distance of the camera may be in a survey frame (m).
+_CANES_NEAR = 2.0
 #: Successive unfamiliar frames after which the page says so: a single one would make the list of open places flicker.
 _UNFAMILIAR_FRAMES = 2
 #: Rule changes that can be undone.
@@ -232,7 +234,7 @@ class Perception:
     def _survey(self, view: View, labels: Labels, plant: Plant) -> None:
         """Update plant map, points and obstacles from a survey frame and its plant, in map."""
         cylinders = self._obstacle_map.update(view, labels)
-        canes = self.plant_map.canes_above(_ABOVE_SPUR, self._config.tracker.min_hits)
+        canes = self.plant_map.canes_above(_ABOVE_SPUR, self._config.tracker.min_hits, view.t, _CANES_NEAR)
         plant, numbers = self._numbering.numbered(plant, view.R[:, 0], canes)
         spurs = self.plant_map.update(plant, numbers)
         self._spur_pictures.add(view, plant, numbers)

@@ -28,8 +28,8 @@ class ToolTask(Struct, frozen=True):
         free_axis: True leaves the rotation about the tool's y, the cane's axis, to the lower priorities.
         keep_path: True slows the whole twist if the limits do not allow its speed; False gives the nearest feasible
             twist.
-        ahead: Pose (T_odom_tool, pin.SE3) that the motion wants so many seconds later, at its end for infinity; None
-            for a twist alone. Of use to a method that looks ahead.
+        ahead: Pose (T_odom_tool, pin.SE3) that the motion wants so many seconds later on its clock, at its end for
+            infinity; None for a twist alone. Of use to a method that looks ahead.
     """
 
     twist: Array

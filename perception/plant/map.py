@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
-from perception.arrays import Array, interpolate
+from perception.arrays import Array, distance, interpolate
 from perception.plant.model import Cane, Node, Plant, Span, Spur
 from perception.plant.numbering import SpurNumber
 from rolling_panda.messages.types import Vector3
@@ -353,13 +353,21 @@ class PlantMap:
         """All spurs, vine by vine."""
         return tuple(spur for _, spur in sorted(self._spurs.items()))
 
-    def canes_above(self, arc: float, observations: int) -> Array:
-        """Points on the axes of canes that so many frames have shown, from an arc length (m) on (N×3, m, odom)."""
+    def canes_above(self, arc: float, observations: int, position: Array, radius: float) -> Array:
+        """Points on the standing axes of canes, N×3 (m, odom).
+
+        Args:
+            arc: From here on (m from the base).
+            observations: Least number of frames that have shown the cane; a third of those of its spur at least.
+            position: Of spurs within `radius` (m) of this place (3, m, odom).
+            radius: See there.
+        """
+        near = [spur for spur in self._spurs.values() if distance(spur.position.mean, position) < radius]
         axes = [
-            cane.best.axis[cane.best.arc > arc]
-            for spur in self._spurs.values()
+            cane.best.axis[(cane.best.arc > arc) & (cane.best.arc < cane.cut_at)]
+            for spur in near
             for cane in spur.canes
-            if cane.base.count >= observations
+            if cane.base.count >= observations and 3 * cane.base.count >= spur.position.count
         ]
         return np.concatenate([np.zeros((0, 3)), *axes])
 

@@ -11,9 +11,9 @@ from perception.plant.model import Plant, Spur
 
 #: Distances across the row count less than those along it, as neighbouring spurs differ along it. Wood without canes
 #: is a piece of a spur within this multiple of the distance between spurs.
-_ACROSS, _BARE = 0.6, 1.5
-#: Largest distance of wood on a cane from the axis of that cane (m).
-_ON_CANE = 0.015
+_ACROSS, _BARE = 0.6, 1.3
+#: Largest distance of wood on a cane from the axis of that cane, and of a cane that is the same one (m).
+_ON_CANE, _ALONG_CANE = 0.015, 0.025
 _NO_POINTS: Array = np.zeros((0, 3))
 #: A position's mean covers this many observations.
 _WINDOW = 20
@@ -54,13 +54,13 @@ class SpurNumbering:
         """The plant with each spur once, and the numbers of its spurs in their order.
 
         Hidden wood or lost depth divides a spur in some frames, and a piece of a cane is taken for one in others. What
-        is nearer to a spur than another spur would be is a piece of it: its canes are canes of that spur. What is on a
-        known cane is no spur.
+        is nearer to a spur than another spur would be is a piece of it: its canes are canes of that spur. What is new
+        and on a known cane, with canes along it alone, is no spur; its canes are without one.
 
         Args:
             plant: Plant of one frame, with spurs in order along the row.
             along: Unit vector along the row (3, odom).
-            canes: Points on the axes of known canes, away from their spurs (N×3, odom).
+            canes: Points on the axes of known canes near the camera, away from their spurs (N×3, odom).
         """
         for position in plant.trunks:
             if all(abs(float((position - t.position) @ along)) >= 0.3 * self._spacing for t in self._trunks):
@@ -71,7 +71,8 @@ class SpurNumbering:
             if owners[i] == i:
                 spurs.append(_whole(spur, [plant.spurs[k] for k, owner in owners.items() if owner == i and k != i]))
                 numbers.append(self._observe(spur.position, sites.get(i), along))
-        return replace(plant, spurs=tuple(spurs)), tuple(numbers)
+        unrooted = [cane.axis for i, spur in enumerate(plant.spurs) if owners[i] is None for cane in spur.canes]
+        return replace(plant, spurs=tuple(spurs), unrooted=(*plant.unrooted, *unrooted)), tuple(numbers)
 
     def _vine(self, position: Array, along: Array) -> int:
         """Vine with the nearest trunk along the row; vines out of view are counted by their spacing."""
@@ -86,7 +87,8 @@ class SpurNumbering:
         """Which site each known spur of a frame is, and which spur each is a piece of.
 
         Spurs are the sites that they are nearest to, all of them together, those with canes before others. Of the rest
-        those are pieces that are near one of these. What is on a known cane is nothing, nor is bare wood near a site.
+        what continues a known cane is nothing. Those near one of the spurs are pieces, and bare wood near a site is
+        nothing either.
 
         Returns:
             Index of the site by that of the spur; index of the whole spur by that of each, its own for a whole one and
@@ -95,21 +97,22 @@ class SpurNumbering:
         places = _upright([spur.position for spur in spurs], along)
         known = cdist(places, _upright([site.position for site in self._sites], along))
         bare = np.array([not spur.canes for spur in spurs], dtype=bool)
-        far = self._separation * np.where(bare, 2.0, 1.0)
-        cost = np.minimum(known + far[:, None] - self._separation, far[:, None])
-        pairs = zip(*linear_sum_assignment(cost), strict=True)
+        # Any place with canes is worth more than the nearest one without.
+        gain = np.where(known < self._separation, 2.0 * self._separation - known, 0.0)
+        gain[bare] = np.maximum(gain[bare] - self._separation, 0.0)
+        pairs = zip(*linear_sum_assignment(gain, maximize=True), strict=True)
         sites = {int(i): int(k) for i, k in pairs if known[i, k] < self._separation}
         owners: dict[int, int | None] = {i: i for i in sites}
         apart = cdist(places, places)
-        on_cane = cdist(np.array([spur.position for spur in spurs]).reshape(-1, 3), canes).min(axis=1, initial=np.inf)
         for i in sorted(set(range(len(spurs))) - set(sites), key=lambda i: -len(spurs[i].canes)):
             nearest = min((k for k, owner in owners.items() if owner == k), key=lambda k: float(apart[i, k]), default=i)
-            reach = self._separation * (_BARE if bare[i] or bare[nearest] else 1.0)
-            if nearest != i and apart[i, nearest] < reach:
+            reach = self._separation * (_BARE if bare[i] else 1.0)
+            if _continues(spurs[i], canes):
+                owners[i] = None
+            elif nearest != i and apart[i, nearest] < reach:
                 owners[i] = nearest
             else:
-                nothing = on_cane[i] < _ON_CANE or (bare[i] and known[i].min(initial=np.inf) < reach)
-                owners[i] = None if nothing else i
+                owners[i] = None if bare[i] and known[i].min(initial=np.inf) < reach else i
         return sites, owners
 
     def _observe(self, position: Array, k: int | None, along: Array) -> SpurNumber:
@@ -129,6 +132,13 @@ def _upright(positions: list[Array], along: Array) -> Array:
     """Positions (N×3) with distances across the row shortened: spurs stand beside each other along it."""
     out = np.array(positions).reshape(-1, 3)
     return out - (1.0 - _ACROSS) * (out - (out @ along)[:, None] * along)
+
+
+def _continues(spur: Spur, canes: Array) -> bool:
+    """Whether a spur is on known canes (points N×3), and its own canes run along them."""
+    if cdist(spur.position[None], canes).min(initial=np.inf) > _ON_CANE:
+        return False
+    return all(float(np.median(cdist(cane.axis, canes).min(axis=1))) < _ALONG_CANE for cane in spur.canes)
 
 
 def _whole(spur: Spur, pieces: list[Spur]) -> Spur:

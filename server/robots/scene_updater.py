@@ -1,6 +1,7 @@
 """Draws the robot's newest messages into the 3-D view, and applies what a session asks of its own views."""
 
 import asyncio
+import math
 import time
 
 import numpy as np
@@ -34,9 +35,8 @@ class SceneUpdater:
         self._camera_sequence = 0
         self._obstacles: object = None
         self._scenery: Received[Scenery] | None = None
-        #: The motion of the last update, and the last one of a row that is not there any more.
-        self._motion: object = None
-        self._old_motion: object = None
+        #: When the present row was first heard of (s): what moved before moved in another one.
+        self._row_since = -math.inf
 
     def place_camera(self, session: Session, preset: CameraPreset) -> None:
         """Move the cameras of this session's views to a preset, once the robot's posture is known."""
@@ -88,11 +88,11 @@ class SceneUpdater:
             scene.ghost.set_motion(preview.message)
         if (scenery := link.scenery.peek()) is not None and scenery is not self._scenery:
             if self._scenery is not None and _another_row(self._scenery.message, scenery.message):
-                self._old_motion = self._motion
+                self._row_since = scenery.at
             self._scenery = scenery
             scene.show_row(scenery.message, now)
-        self._motion = motion = link.scenery_motion.peek()
-        if motion is not None and motion is not self._old_motion and scene.shows_row:
+        motion = link.scenery_motion.peek()
+        if motion is not None and motion.at >= self._row_since and scene.shows_row:
             scene.show_row_motion(motion.message)
         if (obstacles := link.obstacles.peek()) is not None and obstacles is not self._obstacles:
             self._obstacles = obstacles

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -36,13 +38,21 @@ def test_spurs_keep_their_numbers_while_the_robot_drives_on():
     assert told(2.2) == (SpurNumber(2, 1),)
 
 
-def test_a_piece_of_wood_beside_a_spur_does_not_get_its_number():
+@pytest.mark.parametrize("others", [(), ((0.6, 0.95, 2),), ((0.6, 0.95, 2), (0.72, 0.95, 2))])
+def test_a_piece_of_wood_beside_a_spur_does_not_get_its_number(others):
     numbers = SpurNumbering(CONFIG.spur_separation, CONFIG.vine_spacing)
-    numbers.numbered(frame((0.2, 0.95, 2), (0.32, 0.95, 2)), ALONG)
+    numbers.numbered(frame((0.2, 0.95, 2), (0.32, 0.95, 2), *others), ALONG)
     # Nearer to where the second spur was than the spur itself.
     plant, told = numbers.numbered(frame((0.2, 0.95, 2), (0.31, 0.96, 0), (0.345, 0.93, 2)), ALONG)
     assert told == (SpurNumber(1, 1), SpurNumber(1, 2))
     assert [round(float(spur.position[0]), 3) for spur in plant.spurs] == [0.2, 0.345]
+
+
+def test_a_known_spur_without_canes_in_a_frame_keeps_its_number_whatever_is_new_there():
+    numbers = SpurNumbering(CONFIG.spur_separation, CONFIG.vine_spacing)
+    numbers.numbered(frame((0.2, 0.95, 2)), ALONG)
+    _, told = numbers.numbered(frame((0.203, 0.95, 0), (0.5, 0.95, 2)), ALONG)
+    assert told == (SpurNumber(1, 1), SpurNumber(1, 2))
 
 
 @pytest.mark.parametrize("seen_before", [False, True])
@@ -60,6 +70,31 @@ def test_wood_without_canes_near_a_known_spur_is_no_spur_and_a_spur_beside_it_is
     numbers.numbered(frame((0.2, 0.95, 2)), ALONG)
     plant, told = numbers.numbered(frame((0.25, 0.92, 0), (0.29, 0.95, 0)), ALONG)
     assert told == (SpurNumber(1, 2),) and plant.spurs[0].position[0] == 0.29
+
+
+#: A known cane that leans over the place of the next spur, and a cane that continues it.
+LEANING = np.array([[0.2 + 0.2 * t, 0.85, 0.95 + 0.3 * t] for t in np.linspace(0.2, 1.0, 60)])
+ALONG_IT = replace(STEM, axis=LEANING[30:], arc=np.linspace(0.0, 0.2, 30))
+
+
+@pytest.mark.parametrize(
+    ("canes", "nothing"), [((), True), ((ALONG_IT,), True), ((STEM,), False), ((ALONG_IT, STEM), False)]
+)
+def test_what_continues_a_known_cane_is_no_spur_but_one_with_a_cane_of_its_own_is(canes, nothing):
+    numbers = SpurNumbering(CONFIG.spur_separation, CONFIG.vine_spacing)
+    numbers.numbered(frame((0.2, 0.95, 2)), ALONG)
+    seen = frame((0.2, 0.95, 2), (0.3, 1.1, 0))
+    seen = replace(seen, spurs=(seen.spurs[0], replace(seen.spurs[1], canes=canes)))
+    plant, told = numbers.numbered(seen, ALONG, LEANING)
+    assert len(told) == len(plant.spurs) == (1 if nothing else 2)
+    assert len(plant.unrooted) == (len(canes) if nothing else 0), "its wood stays in the way of cuts"
+
+
+def test_a_known_spur_is_one_though_a_known_cane_passes_it():
+    numbers = SpurNumbering(CONFIG.spur_separation, CONFIG.vine_spacing)
+    numbers.numbered(frame((0.2, 0.95, 2)), ALONG)
+    _, told = numbers.numbered(frame((0.2, 0.95, 0)), ALONG, np.array([[0.2, 0.85, 0.95]]))
+    assert told == (SpurNumber(1, 1),)
 
 
 @given(
