@@ -211,3 +211,16 @@ def test_what_was_cut_off_is_not_drawn():
     assert abs(line[-1][2] - 1.10) < 0.01
     map_.sever(np.array([0.0, 0.0, 0.955]))
     assert map_.cane_lines() == ()
+
+
+def test_canes_above_their_spur_are_those_that_enough_frames_have_shown_near_by_as_far_as_they_stand():
+    here = np.zeros(3)
+    map_ = known(*[plant(cane(), cane(x=0.1))] * 4, *[plant(cane())] * 6)
+    points = map_.canes_above(0.04, 3, here, 2.0)
+    assert points[:, 2].min() > 0.95 + 0.04 and set(np.round(points[:, 0], 3)) == {0.0, 0.1}
+    assert len(map_.canes_above(0.04, 3, here, 0.5)) == 0, "they are farther away"
+    assert set(map_.canes_above(0.04, 5, here, 2.0)[:, 0]) == {0.0}
+    map_ = known(*[plant(cane(), cane(x=0.1))] * 4, *[plant(cane())] * 9)
+    assert set(map_.canes_above(0.04, 3, here, 2.0)[:, 0]) == {0.0}, "most frames do not show the other one"
+    map_.sever(np.array([0.0, 0.0, 0.95 + 0.20]))
+    assert map_.canes_above(0.04, 3, here, 2.0)[:, 2].max() < 0.95 + 0.21
