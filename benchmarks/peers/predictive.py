@@ -40,8 +40,6 @@ _MANIPULABILITY, _GOOD_OMEGA, _NEAR = 3.0, 0.15, 0.3
 _POSTURE, _FIRM = 0.03, 10.0
 #: Factor of the base's speed cost where the base is held.
 _HELD = 1e4
-#: A motion whose end is farther away than this (m) is another one. Least rate of its clock for which is planned.
-_ELSEWHERE, _LEAST_RATE = 0.05, 0.2
 #: Entries of the state: base pose and arm joints, then ν.
 _POSES, _NX = 10, 10 + NXI
 
@@ -157,7 +155,8 @@ class Following(Predictive):
     def _follow(self, problem: IkProblem, task: ToolTask) -> None:
         """Let each knot aim at where the motion has the tool then, with base and arm near the motion's posture.
 
-        A motion that ends elsewhere is another one, and what was planned for the last is forgotten.
+        A motion that ends elsewhere is another one, and what was planned for the last is forgotten. The knots are on
+        the clock of the motion at full rate; at the rate of a motion that is held they do worse in rows.
         """
         T, ahead = problem.kinematics.T_odom_tool, task.ahead
 
@@ -167,16 +166,14 @@ class Following(Predictive):
 
         if ahead is None:
             ahead, self._end = along, None
-        else:
-            end, before = ahead(math.inf), self._end
-            if before is None or float(np.linalg.norm(end.translation - before.translation)) > _ELSEWHERE:
-                self._forget()
-            self._end = end
+        elif self._end is None or not ahead(math.inf).isApprox(self._end):
+            self._end = ahead(math.inf)
+            self._forget()
         if not self._due:
             return
         posture = _pose(problem.posture.q)
         for number, model in enumerate(self._knots):
-            model.aim(ahead(number * _STEP * max(problem.scale, _LEAST_RATE)), task.free_axis)
+            model.aim(ahead(number * _STEP), task.free_axis)
             model.stay(posture, problem.arm_only)
 
 
