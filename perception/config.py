@@ -141,7 +141,7 @@ class TrackerConfig(Struct, frozen=True, forbid_unknown_fields=True):
         gone_frames: Frames that must show the cane gone before its point is withdrawn.
         probe_distance: The cane is checked this far past the cut (m).
         vine_spacing: Distance between vines, for numbers where no trunk is in view (m).
-        spur_separation: Spur positions nearer than this are one spur (m).
+        spur_separation: Spur positions nearer than this are one spur (m); across the row 0.6 of a distance counts.
     """
 
     association_distance: Positive = 0.03
