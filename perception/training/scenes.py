@@ -93,7 +93,7 @@ def _row(seed: int) -> list[tuple[NDArray[np.uint8], NDArray[np.float16], NDArra
         place[:3, 3] = [
             config.first_vine_x + rng.uniform(-0.8, across + 0.8),
             config.row_distance - rng.uniform(*distance),
-            config.cordon_height + rng.normal(0.1, 0.12),
+            config.fruiting_wire + rng.normal(0.1, 0.12),
         ]
         image = camera.render(row, place, view, rng.normal(0.0, _SPEED))
         out.append((_sent(image.color, rng), image.depth.astype(np.float16), image.labels))
@@ -123,11 +123,14 @@ def _weather(rng: np.random.Generator) -> WorldConfig:
 
 def _vineyard(rng: np.random.Generator) -> VineyardConfig:
     stub = float(rng.uniform(0.02, 0.05))
+    guyot = rng.random() < 0.2
+    spacing, wire = float(rng.uniform(1.2, 2.2)), float(rng.uniform(0.8, 1.1))
     return VineyardConfig(
-        training="guyot" if rng.random() < 0.2 else "cordon",
+        training="guyot" if guyot else "cordon",
         vines=2,
-        vine_spacing=float(rng.uniform(1.2, 2.2)),
-        cordon_height=float(rng.uniform(0.8, 1.1)),
+        vine_spacing=spacing,
+        cordon_height=wire,
+        guyot_wire=wire,
         cordon_radius=(float(rng.uniform(0.010, 0.014)), float(rng.uniform(0.016, 0.024))),
         stub_length=(stub, stub + 0.05),
         stub_radius=(0.0055, 0.010),

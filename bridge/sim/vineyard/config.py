@@ -52,6 +52,9 @@ class VineyardConfig(Struct, frozen=True, forbid_unknown_fields=True):
         node_swelling: Radius of a node as a factor of the cane's radius.
         cane_droop: Lean of a cane's tip under its weight.
         laterals: Fraction of nodes with a lateral shoot, where `[world]` has no more.
+        guyot_wire: Height of the fruiting wire above the ground where vines are trained as Guyot, in place of
+            `cordon_height`.
+        guyot_head: So far below this wire a Guyot vine's trunk ends.
         guyot_nodes: Shoots on the cane of last year.
         guyot_radius: Radius of that cane at its tip and at the head.
         old_cut: Height of the old cut on the tip of a stub.
@@ -95,6 +98,8 @@ class VineyardConfig(Struct, frozen=True, forbid_unknown_fields=True):
     node_swelling: tuple[Positive, Positive] = (1.35, 1.5)
     cane_droop: tuple[Share, Share] = (0.0, 0.15)
     laterals: Share = 0.0
+    guyot_wire: Positive = 0.7
+    guyot_head: Positive = 0.12
     guyot_nodes: Annotated[int, Meta(ge=3, le=20)] = 8
     guyot_radius: tuple[Positive, Positive] = (0.0045, 0.007)
     old_cut: tuple[Positive, Positive] = (0.004, 0.010)
@@ -104,6 +109,11 @@ class VineyardConfig(Struct, frozen=True, forbid_unknown_fields=True):
     hose_radius: Positive = 0.008
     rows_behind: Annotated[int, Meta(ge=0, le=5)] = 1
     row_spacing: Positive = 2.5
+
+    @property
+    def fruiting_wire(self) -> float:
+        """Height of the arms or canes that are tied along the row (m)."""
+        return self.guyot_wire if self.training == "guyot" else self.cordon_height
 
     def check(self) -> None:
         """Check the ranges.

@@ -14,6 +14,8 @@ from bridge.sim.vineyard.surroundings import add_hose, add_old_cuts, add_posts_a
 
 #: Rods of a trunk, and length of a rod of a cordon arm (m).
 _TRUNK_RODS, _ARM_ROD = 6, 0.12
+#: The trunk of a cordon-trained vine ends so far below the arms (m).
+_BELOW_ARMS = 0.05
 #: From the head to the first shoot along the cane that was laid down (m): this bow carries none.
 _GUYOT_BEND = 0.16
 #: Positions of the spur's two canes as fractions of its length; the lower one further outwards.
@@ -50,7 +52,8 @@ def grow(config: VineyardConfig, seed: int) -> Row:
 def _vine(growth: RowBuilder, rng: np.random.Generator, vine: int) -> None:
     config = growth.config
     foot = np.array([config.first_vine_x + vine * config.vine_spacing, config.row_distance, 0.0])
-    head = foot + [0.0, 0.0, config.cordon_height - 0.05]
+    below = config.guyot_head if config.training == "guyot" else _BELOW_ARMS
+    head = foot + [0.0, 0.0, config.fruiting_wire - below]
     points = foot + np.linspace(0, 1, _TRUNK_RODS + 1)[:, None] * (head - foot)
     points[1:-1, :2] += rng.normal(0.0, 0.008, (_TRUNK_RODS - 1, 2))
     radii = np.linspace(config.trunk_radius[1], config.trunk_radius[0], _TRUNK_RODS + 1)
@@ -134,7 +137,7 @@ def _guyot_vine(growth: RowBuilder, rng: np.random.Generator, vine: int, trunk: 
     config = growth.config
     side = float(rng.choice([-1.0, 1.0]))
     _guyot_spur(growth, rng, vine, trunk, -side)
-    level = head + [side * _GUYOT_BEND, 0.0, config.cordon_height - head[2]]
+    level = head + [side * _GUYOT_BEND, 0.0, config.guyot_wire - head[2]]
     steps = [draw(rng, config.internode) for _ in range(config.guyot_nodes - 1)]
     # The arm never reaches the next vine's head.
     longest = config.vine_spacing - _GUYOT_BEND - 0.12

@@ -22,7 +22,7 @@ def add_posts_and_wires(growth: RowBuilder) -> None:
         growth.add(Rod("post", foot, top, config.post_radius, config.post_radius))
     under = -config.cordon_radius[1] - config.wire_radius
     for above in (under, *config.wires):
-        ends = np.array([[first, y, config.cordon_height + above], [last, y, config.cordon_height + above]])
+        ends = np.array([[first, y, config.fruiting_wire + above], [last, y, config.fruiting_wire + above]])
         growth.add(Rod("wire", ends[0], ends[1], config.wire_radius, config.wire_radius))
 
 
@@ -78,15 +78,15 @@ def backdrop(config: VineyardConfig, seed: int) -> tuple[Rod, ...]:
         y = config.row_distance + row * config.row_spacing
         shift = float(rng.uniform(0.0, config.vine_spacing))
         for above in (0.0, *config.wires):
-            z = config.cordon_height + above
+            z = config.fruiting_wire + above
             thick = config.wire_radius if above else config.cordon_radius[1]
             ends = [np.array([first - 3.0, y, z]), np.array([last + 3.0, y, z])]
             rods.append(Rod("wire" if above else "cordon", ends[0], ends[1], thick, thick))
         for x in np.arange(first - 3.0 + shift, last + 3.0, config.vine_spacing):
             foot = np.array([x, y, 0.0])
-            rods.append(Rod("trunk", foot, foot + [0.0, 0.0, config.cordon_height], *config.trunk_radius[::-1]))
+            rods.append(Rod("trunk", foot, foot + [0.0, 0.0, config.fruiting_wire], *config.trunk_radius[::-1]))
             for _ in range(2 * config.spurs_per_arm * 2):
-                start = np.array([x + rng.uniform(-0.9, 0.9), y, config.cordon_height])
+                start = np.array([x + rng.uniform(-0.9, 0.9), y, config.fruiting_wire])
                 lean = rng.normal(0.0, config.cane_tilt, 2)
                 tip = start + draw(rng, config.cane_length) * unit_vector(np.array([lean[0], lean[1], 1.0]))
                 rods.append(Rod("cane", start, tip, config.cane_radius_mean, 0.5 * config.cane_radius_mean))
