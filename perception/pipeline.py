@@ -15,7 +15,7 @@ from perception.config import PerceptionConfig, RuleConfig
 from perception.localisation.row_frame import RowFrame
 from perception.obstacles.cylinder_fit import Rejection
 from perception.obstacles.obstacle_map import ObstacleMap
-from perception.plant.capsules import CapsuleSet
+from perception.plant.capsules import CapsuleSet, permanent
 from perception.plant.map import PlantMap
 from perception.plant.model import Plant, Spur
 from perception.plant.numbering import SpurNumber, SpurNumbering
@@ -26,10 +26,11 @@ from perception.rules.pruning import Decision, apply_rule
 from perception.segmentation.frame import CORDON, UnusablePictureError, View, decode_frame
 from perception.segmentation.network_segmenter import NetworkSegmenter
 from perception.segmentation.segmenter import Segmenter
-from perception.skeleton.topology import perceive_plant, trace_canes
+from perception.skeleton.topology import perceive_plant, trace_canes, trace_old_canes
 from perception.tracking.camera_rays import CameraRays, Ray
 from perception.tracking.close_up import AROUND, check_close_up, failed_check
 from perception.tracking.cut_sight import CutFollower, unseen
+from perception.tracking.old_canes import OldCanes, at_heads, beside_spurs
 from perception.tracking.picture_shift import UNSHIFTED
 from perception.tracking.retained_canes import RetainedCanes
 from perception.tracking.spur_pictures import SpurPictures
@@ -79,6 +80,9 @@ _ABOVE_SPUR = 0.04
 _CANES_NEAR = 2.0
 #: Successive unfamiliar frames after which the page says so: a single one would make the list of open places flicker.
 _UNFAMILIAR_FRAMES = 2
+#: Kinds of cuts that are on no cane that stays.
+_BESIDE_CANES = ("renewal cut", "removal")
+_OLD_CANE_UNSEEN = reasons.old_cane_unseen()
 #: Rule changes that can be undone.
 _MAX_UNDO = 20
 #: A position nearer than this to a cut that was made has been cut (m).
@@ -141,6 +145,7 @@ class Perception:
         self._cane_lines: tuple[tuple[m.Vector3, ...], ...] = ()
         self._obstacle_map = ObstacleMap(config.obstacles)
         self._retained_canes = RetainedCanes(config.obstacles)
+        self._old_canes = OldCanes()
         self._spur_pictures = SpurPictures()
         self.pictures: tuple[SpurPicture, ...] = ()
         """Pictures of the spurs with a published point, and of the undecided ones."""
@@ -211,7 +216,7 @@ class Perception:
             if self.row_frame.uncertain:
                 self._locate(view, labels)
             view = self.row_frame.in_map(view)
-            cylinders = self._obstacle_map.update(view, labels)
+            cylinders = self._obstacle_map.update(view, labels, apart=self._old_canes.capsules())
             self._apply(self._tracker.update(view, labels, []))
             self._update_obstacles(view, labels, cylinders, ())
             self._site_messages = (undecided_site(self._no_survey()),)
@@ -221,9 +226,9 @@ class Perception:
 
     def _process_unfamiliar(self, view: View, labels: Labels, reason: m.Reason) -> m.PruningPoints:
         """Points after a frame of doubtful classes or place: it adds obstacles, and removes and proposes nothing."""
-        cylinders = self._obstacle_map.update(view, labels, only_add=True)
+        cylinders = self._obstacle_map.update(view, labels, only_add=True, apart=self._old_canes.capsules())
         canes = tuple(capsule for capsule in self._wood if capsule.kind == "cane")
-        wood = (cylinders + canes)[: self._config.obstacles.max_capsules]
+        wood = (cylinders + self._old_canes.capsules() + canes)[: self._config.obstacles.max_capsules]
         self._wood = self._wood if wood == self._wood else wood
         self._unfamiliar_frames += 1
         if self._unfamiliar_frames < _UNFAMILIAR_FRAMES:
@@ -233,23 +238,30 @@ class Perception:
 
     def _survey(self, view: View, labels: Labels, plant: Plant) -> None:
         """Update plant map, points and obstacles from a survey frame and its plant, in map."""
-        cylinders = self._obstacle_map.update(view, labels)
+        cylinders = self._obstacle_map.update(view, labels, apart=self._old_canes.capsules())
+        guyot, along = self._config.rule.system == "guyot", view.R[:, 0]
+        if guyot:
+            plant = at_heads(plant, [each for each in cylinders if each.kind in ("trunk", "post")], along)
         canes = self.plant_map.canes_above(_ABOVE_SPUR, self._config.tracker.min_hits, view.t, _CANES_NEAR)
-        plant, numbers = self._numbering.numbered(plant, view.R[:, 0], canes)
+        plant, numbers = self._numbering.numbered(plant, along, canes)
         spurs = self.plant_map.update(plant, numbers)
+        old_canes = trace_old_canes(view, labels, self._config.skeleton) if guyot else []
+        old_of = beside_spurs(old_canes, plant, numbers)
+        self._old_canes.see(old_of)
         self._spur_pictures.add(view, plant, numbers)
         fused = {spur.number: spur.as_spur() for spur in self.plant_map.spurs} if self._config.fuse else {}
         keep_out = frame_keep_out(view, labels, self._wood, self._config.rule)
         decisions: list[tuple[Spur, SpurNumber, Decision]] = []
         contradicted: set[Site] = set()
         for seen, spur, number in zip(plant.spurs, spurs, numbers, strict=True):
-            decision = apply_rule(fused.get(number, spur), self._config.rule, plant.other_canes(seen), keep_out)
+            whole, others = fused.get(number, spur), plant.other_canes(seen)
+            decision = apply_rule(whole, self._config.rule, others, keep_out, old_of.get(number))
             decisions.append((spur, number, decision))
             contradicted |= {(number, kind) for kind in decision.contradicted}
         self._apply(self._tracker.update(view, labels, _proposals(decisions), numbers, contradicted))
         unconfirmed = self._tracker.unconfirmed()
         for spur, number, decision in decisions:
-            aside = abs(float(view.R[:, 0] @ (spur.position - view.t)))
+            aside = abs(float(along @ (spur.position - view.t)))
             self._update_undecided(number, spur, decision, aside < _IN_FRONT, unconfirmed)
         self._update_obstacles(view, labels, cylinders, numbers)
         self._cane_lines = self.plant_map.cane_lines()
@@ -293,7 +305,7 @@ class Perception:
             check, shift = check_close_up(view, self.segmenter, point, frame.number, self._config, known, expected)
         except UnusablePictureError as error:
             return failed_check(frame, error.reason)
-        self._follower.begin(check, point.kind == "renewal cut")
+        self._follower.begin(check, point.kind)
         if check.position is not None:
             self._shifts[point.point_id] = shift
             # In the map, which is not shifted with the picture.
@@ -379,7 +391,7 @@ class Perception:
         """The points with their distances to wires and cordons."""
         positions = np.array([point.position for point in points]).reshape(-1, 3)
         wires, cordons = (
-            [None if np.isinf(d) else d for d in CapsuleSet(self._wood, (kind,)).nearest(positions).tolist()]
+            [None if np.isinf(d) else d for d in CapsuleSet(permanent(self._wood), (kind,)).nearest(positions).tolist()]
             for kind in ("wire", "cordon")
         )
         return tuple(
@@ -399,7 +411,7 @@ class Perception:
         self.withdrawn = self._tracker.withdraw_all()
         self.plant_map, self._spur_pictures, self._undecided = PlantMap(), SpurPictures(), UndecidedSites()
         self._undo, self._severed, self._cane_lines, self._site_messages = [], [], (), ()
-        self._shifts = {}
+        self._old_canes, self._shifts = OldCanes(), {}
         self.row_frame.forget()
 
     def _add(self, request: AddPoint) -> m.Answer:
@@ -431,6 +443,8 @@ class Perception:
             return _refused(reasons.point_unseen(request.point_id))
         if point.kind == "renewal cut":
             return _refused(reasons.renewal_cut_fixed())
+        if point.kind == "removal":
+            return _refused(reasons.removal_fixed())
         position = np.array(point.position)
         cut = move_cut(self.plant_map, position, request.along, self._config.rule, self._wood, request.user)
         if isinstance(cut, m.Reason):
@@ -515,7 +529,8 @@ class Perception:
         for number, spur in spurs.items():
             axes = [cane.axis for other in spurs.values() if other is not spur for cane in other.canes]
             other_canes = np.concatenate([np.zeros((0, 3)), *axes])
-            decisions.append((spur, number, apply_rule(spur, rule, other_canes, keep_out)))
+            old_cane = self._old_canes.newest(number)
+            decisions.append((spur, number, apply_rule(spur, rule, other_canes, keep_out, old_cane)))
         return decisions
 
     def _update_undecided(
@@ -526,19 +541,24 @@ class Perception:
         in_front: bool,
         unconfirmed: Collection[Site] = (),
     ) -> None:
-        causes = list(decision.undecided)
+        # One picture hides what another one has shown.
+        shown = (number, "removal") in self._tracker.sites
+        causes = [each for each in decision.undecided if not (shown and each == _OLD_CANE_UNSEEN)]
         if any((number, cut.kind) in unconfirmed for cut in decision.cuts):
             causes.append(reasons.cut_unconfirmed())
-        has_cuts = any(cut.kind != "renewal cut" for cut in decision.cuts)
+        has_cuts = any(cut.kind not in _BESIDE_CANES for cut in decision.cuts)
         self._undecided.update(number, has_cuts, causes, vector3(spur.position), in_front)
 
     def _undecided_sites(self) -> tuple[m.UndecidedSite, ...]:
-        points = (point for point in self._tracker.points() if point.kind != "renewal cut")
+        points = (point for point in self._tracker.points() if point.kind not in _BESIDE_CANES)
         return self._undecided.remaining({SpurNumber(point.vine, point.spur) for point in points})
 
     def _apply(self, update: TrackerUpdate) -> None:
         self.withdrawn += update.withdrawn
         for position in update.severed:
+            if self._old_canes.sever(position):
+                self._severed.append(position)
+                continue
             found = self.plant_map.nearest_cane(position)
             if found is not None:
                 self._spur_pictures.forget(found[0].number)
@@ -549,10 +569,10 @@ class Perception:
         self, view: View, labels: Labels, cylinders: tuple[Capsule, ...], numbers: tuple[SpurNumber, ...]
     ) -> None:
         """Publish cylinders and the nearest retained canes; `numbers` are the spurs of this frame."""
-        obstacles, config = cylinders, self._config.obstacles
+        obstacles, config = cylinders + self._old_canes.capsules(), self._config.obstacles
         if config.canes:
             seen = [spur for spur in self.plant_map.spurs if spur.number in numbers]
-            room = max(0, config.max_capsules - len(cylinders))
+            room = max(0, config.max_capsules - len(obstacles))
             cuts = self._tracker.published_cuts()
             obstacles += self._retained_canes.update(view, labels, seen, cuts, self._config.rule, room)
         # Without news the object stays the same.

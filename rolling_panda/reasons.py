@@ -1622,6 +1622,11 @@ def guyot_cut_upper(distance_mm: float, node: float) -> None:
 
 
 @_reason("info", "")
+def old_cane_removed(distance_mm: float) -> None:
+    """Guyot, last year's cane is taken off its head: {distance_mm:.0f} mm past the trunk."""
+
+
+@_reason("info", "")
 def renewal_cut(others: float) -> None:
     """Renewal cut: the old stub falls with {others:.0f} other {others:cane|canes}, just past the cane that stays."""
 
@@ -1657,6 +1662,11 @@ def moved_below_nodes(user: str) -> None:
 @_reason("info", "")
 def old_cane_left() -> None:
     """Last year's cane is left for a person: the program takes it for a cordon, and keeps the blades off it."""
+
+
+@_reason("info", "")
+def old_cane_unseen() -> None:
+    """Last year's cane is not seen where it leaves the trunk."""
 
 
 @_reason("info", "")
@@ -1925,6 +1935,11 @@ def point_there_already(point: str, distance_mm: float) -> None:
 @_reason("warning", "reject it, and place one by hand")
 def renewal_cut_fixed() -> None:
     """A renewal cut is on the old stub."""
+
+
+@_reason("warning", "reject it, and place one by hand")
+def removal_fixed() -> None:
+    """A removal is beside the head of the vine."""
 
 
 @_reason("info", "")

@@ -84,7 +84,7 @@ def pictures(seeds: Sequence[int], segmenter: str) -> list[Picture]:
                     position=vector3(expected),
                     tangent=vector3(cut.tangent),
                 )
-                follower.begin(check, stub=False)
+                follower.begin(check, "spur cut")
                 begin = time.perf_counter()
                 view = replace(decode_frame(frame, model), R=pose[:3, :3], t=pose[:3, 3], stamp=0.0)
                 sight = follower.look(view, sees, "p", 2)

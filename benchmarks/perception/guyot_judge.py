@@ -1,32 +1,33 @@
-"""Judges points of a surveyed row of Guyot vines: the cut back to a spur, and the one past the nodes that fruit."""
+"""Judges points of a surveyed row of Guyot vines: back to a spur, past the nodes that fruit, and last year's cane off."""
 
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from benchmarks.perception.judge import ON_AXIS, JudgedPoint, RowJudge, Sight, nearest_rod, sight_places
-from bridge.sim.vineyard.row import Array
+from bridge.sim.vineyard.row import Array, Rod
 from bridge.sim.vineyard.truth import RightCut, judge_guyot
 from rolling_panda import messages as m
 from rolling_panda.reasons import text_of
 
-#: What the two canes of a vine's spur are cut for, lower one first; these numbers stand for the spur's in results.
-KINDS = ("spur cut", "cane cut")
+#: What the lower and the upper cane of a vine's spur and last year's cane are cut for; these numbers stand for the
+#: spur's in results.
+KINDS = ("spur cut", "cane cut", "removal")
 
 
 @dataclass(frozen=True)
 class _Wanted:
-    """A right cut: its kind, the cane that it is on, and the middles of that cane's count nodes (N×3, m)."""
+    """A right cut: its kind, the rods of the wood that it is on, and the middles of its count nodes (N×3, m)."""
 
     kind: int
-    cane: int
+    wood: tuple[Rod, ...]
     cut: RightCut
     nodes: Array
 
 
 @dataclass
 class GuyotJudge(RowJudge):
-    """Follows a survey frame by frame, then judges what came of it. Last year's cane has no point and is not judged."""
+    """Follows a survey frame by frame, then judges what came of it."""
 
     _wanted: dict[tuple[int, int], _Wanted] = field(default_factory=dict)
 
@@ -38,11 +39,19 @@ class GuyotJudge(RowJudge):
                     continue
                 own = [(k, rod) for k, rod in self.row.standing() if (rod.vine, rod.spur) == (truth.vine, 0)]
                 middles = [rod.at(0.5)[0] for _, rod in own if rod.kind == "node" and rod.cane == cane][1:]
-                wanted = _Wanted(kind, cane, cut, np.array(middles).reshape(-1, 3))
+                wood = tuple(rod for _, rod in own if rod.cane == cane)
+                wanted = _Wanted(kind, wood, cut, np.array(middles).reshape(-1, 3))
                 self._wanted[truth.vine, kind] = wanted
                 self._cuts[truth.vine, kind] = cut
                 seen = [(k, rod) for k, rod in own if rod.kind == "spur" or (rod.cane == cane and k <= cut.rod)]
                 self._sights[truth.vine, kind] = Sight(*sight_places(self.row, seen))
+            number = truth.removal.rod
+            rod = self.row.rods[number]
+            assert rod is not None
+            last = len(KINDS) - 1
+            self._wanted[truth.vine, last] = _Wanted(last, (rod,), truth.removal, np.zeros((0, 3)))
+            self._cuts[truth.vine, last] = truth.removal
+            self._sights[truth.vine, last] = Sight(*sight_places(self.row, [(number, rod)]))
 
     def spurs(self) -> tuple[tuple[int, int], ...]:
         """Vine and number of each right cut, also of those that no frame had in view."""
@@ -56,7 +65,7 @@ class GuyotJudge(RowJudge):
         """Judge one point."""
         position, tangent = np.array(point.position), np.array(point.tangent)
         off_axis, rod = nearest_rod(self.row, position)
-        kind = KINDS.index("cane cut" if point.kind == "cane cut" else "spur cut")
+        kind = KINDS.index(point.kind if point.kind in KINDS else "spur cut")
         told = JudgedPoint(
             seed=self.seed,
             point_id=point.point_id,
@@ -74,7 +83,7 @@ class GuyotJudge(RowJudge):
             reason=text_of(point.reason),
         )
         wanted = self._wanted.get((rod.vine, kind))
-        if wanted is None or (rod.spur, rod.cane) != (0, wanted.cane):
+        if wanted is None or not any(rod is each for each in wanted.wood):
             return told
         cut = wanted.cut
         inside = float((position - cut.least) @ cut.tangent) >= 0.0 >= cut.past_most(position)

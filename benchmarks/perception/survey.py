@@ -49,6 +49,8 @@ LIGHT = ("sunlight", "glare", "wet", "exposure")
 SHOOTS = ("laterals", "tendrils", "leaves", "drooping")
 #: Nodes that stay, by the kind of cut.
 KEPT = {"spur cut": 2, "cane cut": 8}
+#: Kinds of which each is told by itself.
+KINDS = (*KEPT, "removal")
 #: The camera stands so far ahead of the base in the survey posture (m), and begins before the first trunk.
 _CAMERA_AHEAD = 0.5
 
@@ -155,9 +157,10 @@ def survey_row(
 def summarise(survey: Survey, visibility: str | None = None) -> dict[str, Figure]:
     """The figures, for all spurs or for those of one class of visibility."""
     chosen = [p for p in survey.points if visibility in (None, p.visibility)]
-    cuts = [p for p in chosen if p.kind in KEPT]
+    cuts = [p for p in chosen if p.kind in KINDS]
     renewals = [p for p in chosen if p.kind == "renewal cut"]
     on_cane = [p for p in cuts if p.right_cane]
+    counted = [p for p in on_cane if p.kind in KEPT]
     along = [abs(p.along_error) for p in on_cane if p.along_error is not None]
     spurs = [s for s in survey.spurs if visibility in (None, s["visibility"])]
     # A spur that was hidden all along is no spur that one could have found.
@@ -167,7 +170,7 @@ def summarise(survey: Survey, visibility: str | None = None) -> dict[str, Figure
         "right_cane": share(len(on_cane), len(cuts)),
         "along_error_median_m": quantile(along, 0.5),
         "along_error_p95_m": quantile(along, 0.95),
-        "node_count_right": share(sum(p.nodes_left == KEPT[p.kind] for p in on_cane), len(on_cane)),
+        "node_count_right": share(sum(p.nodes_left == KEPT[p.kind] for p in counted), len(counted)),
         "plane_within_15_deg": share(sum((p.plane_error or 0.0) <= 15.0 for p in on_cane), len(on_cane)),
         "right": share(sum(p.right for p in cuts), len(cuts)),
         "renewal_right": share(sum(p.right for p in renewals), len(renewals)),
@@ -182,7 +185,7 @@ def summarise(survey: Survey, visibility: str | None = None) -> dict[str, Figure
 
 def _by_kind(spurs: list[dict[str, int | bool | str]]) -> dict[str, Figure]:
     """Where vines have cuts of several kinds: of all of each, out of view too, those with a right point."""
-    kinds = [kind for kind in KEPT if any(spur["kind"] == kind for spur in spurs)]
+    kinds = [kind for kind in KINDS if any(spur["kind"] == kind for spur in spurs)]
     if len(kinds) < 2:
         return {}
     own = {kind: [bool(spur["right"]) for spur in spurs if spur["kind"] == kind] for kind in kinds}

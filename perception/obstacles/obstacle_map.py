@@ -25,6 +25,8 @@ from rolling_panda.model.wire_values import vector3
 _MAX_SHARE = 0.75
 #: Course of each class: `upright`, straight `along` the row, or along it in bent `pieces`.
 _SHAPES: dict[WoodClass, str] = {"post": "upright", "trunk": "upright", "cordon": "pieces", "wire": "along"}
+#: What is nearer than this to the surface of wood that is known otherwise is a part of it (m).
+_APART = 0.018
 #: A post and a trunk with a smaller distance between their surfaces are the same thing (m).
 _SAME = 0.01
 
@@ -53,13 +55,16 @@ class ObstacleMap:
         self.rejected: Counter[tuple[WoodClass, Rejection]] = Counter()
         """Implausible wood by class and reason, as of the last frame."""
 
-    def update(self, view: View, labels: Labels, only_add: bool = False) -> tuple[Capsule, ...]:
+    def update(
+        self, view: View, labels: Labels, only_add: bool = False, apart: tuple[Capsule, ...] = ()
+    ) -> tuple[Capsule, ...]:
         """Add one frame; returns the map.
 
         Args:
             view: The frame.
             labels: H×W class indices.
             only_add: Nothing is forgotten for this frame, whose classes are doubtful.
+            apart: Wood of class cordon that is known otherwise, and is no part of this map.
 
         Returns:
             Capsules in odom (m), the nearest where they are too many.
@@ -71,6 +76,8 @@ class ObstacleMap:
             grid.update(view, labels, min_depth, config.max_depth, config.max_points, only_add)
         occupied = {kind: grid.occupied() for kind, grid in self._grids.items()}
         plane = row_plane(occupied)
+        cordon = occupied["cordon"]
+        occupied["cordon"] = cordon.select(CapsuleSet(apart).nearest(cordon.position) > _APART)
         self.rejected.clear()
         capsules = [capsule for kind, cells in occupied.items() for capsule in self._capsules(kind, cells, plane)]
         capsules = self._without_duplicates(self._standing(capsules, occupied["cordon"].position))

@@ -7,6 +7,11 @@ from rolling_panda.messages.perception import Capsule
 from rolling_panda.messages.types import WoodClass
 
 
+def permanent(capsules: tuple[Capsule, ...]) -> tuple[Capsule, ...]:
+    """Capsules without last year's canes of Guyot vines, which have the class of a cordon."""
+    return tuple(capsule for capsule in capsules if capsule.kind != "cordon" or capsule.spur < 0)
+
+
 class CapsuleSet:
     """Capsules prepared for distance queries."""
 

@@ -26,6 +26,7 @@ _LOOK_AGAIN = frozenset(
         reasons.stray_cane_hidden(),
         reasons.no_cordon_in_range(0, 0),
         reasons.cut_unconfirmed(),
+        reasons.old_cane_unseen(),
     )
 )
 

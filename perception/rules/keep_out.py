@@ -7,7 +7,7 @@ import numpy as np
 
 from perception.arrays import Array, Labels
 from perception.config import RuleConfig
-from perception.plant.capsules import CapsuleSet
+from perception.plant.capsules import CapsuleSet, permanent
 from perception.segmentation.frame import HOSE, WIRE, View
 from rolling_panda import reasons
 from rolling_panda.messages.perception import Capsule
@@ -133,7 +133,7 @@ def _wire_reason(rule: RuleConfig) -> Reason:
 
 
 def _wood_reason(obstacles: tuple[Capsule, ...], rule: RuleConfig) -> Callable[[Array], Reason | None]:
-    wood = {kind: CapsuleSet(obstacles, (kind,)) for kind in ("cordon", "trunk")}
+    wood = {kind: CapsuleSet(permanent(obstacles), (kind,)) for kind in ("cordon", "trunk")}
 
     def reason(position: Array) -> Reason | None:
         for kind, capsules in wood.items():

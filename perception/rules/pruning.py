@@ -4,7 +4,7 @@ Spur pruning: the lowest cane that is thick enough, else the thickest, becomes t
 past its second count node. A renewal cut beyond the keeper removes the old stub with the other canes.
 
 Guyot pruning: of two canes the lower one becomes the next spur, and the upper one the fruiting cane. Last year's cane
-is left for a person.
+is cut off beside the head.
 
 Nothing is extrapolated: nodes that were not seen are not counted.
 """
@@ -14,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
-from typing import Final, Literal
+from typing import Literal
 
 import numpy as np
 from msgspec.structs import replace
@@ -50,9 +50,11 @@ _BASE, _LEAST_SINE, _THICK = 0.025, 0.2, 0.015
 #: Reasons against a cut that other pictures propose: they see its nodes or canes otherwise. All others only tell that a
 #: picture shows too little.
 _AGAINST = {"nodes_side_by_side", "nodes_far_apart", "cane_below_keeper", "keeper_close"}
-#: The Guyot rule never proposes the removal of last year's cane: it has the class of a cordon, which the blades keep
-#: off, and the wire that it is tied to leaves them no room beside the head (docs/perception.md).
-_OLD_CANE: Final = reasons.old_cane_left()
+#: Last year's cane is cut so far from its trunk, and farther out where there is no room, up to here (m). A stump of
+#: twice its diameter or more dries, and the head stays sound.
+_STUMP, _LONGEST_STUMP, _STUMP_STEP = 0.04, 0.10, 0.01
+#: By so much nearer to the trunk it may be cut (m).
+_SHORTER_STUMP = 0.01
 
 
 @dataclass(frozen=True)
@@ -61,7 +63,7 @@ class Cut:
 
     Attributes:
         kind: Spur cut (shortening of the keeper), renewal cut (removal of the stub beyond it), cane cut (shortening of
-            the fruiting cane, Guyot), or by hand.
+            the fruiting cane, Guyot), removal (of last year's cane, Guyot), or by hand.
         position: On the axis of the wood (3, m, odom).
         tangent: Unit vector along the wood, away from the cordon (3, odom).
         radius: Of the wood (m).
@@ -131,7 +133,11 @@ class _Keeper:
 
 
 def apply_rule(
-    spur: Spur, config: RuleConfig, other_canes: Array | None = None, keep_out: KeepOut = NO_KEEP_OUT
+    spur: Spur,
+    config: RuleConfig,
+    other_canes: Array | None = None,
+    keep_out: KeepOut = NO_KEEP_OUT,
+    old_cane: Cane | None = None,
 ) -> Decision:
     """Apply the rule of the configured training system to one spur.
 
@@ -140,9 +146,12 @@ def apply_rule(
         config: Pruning rule.
         other_canes: Axis points of canes of other spurs, N×3 in odom (m).
         keep_out: Keep-out zones of the blades.
+        old_cane: Last year's cane beside the spur of a Guyot vine.
     """
-    rule = _prune_guyot if config.system == "guyot" else _prune_spur
-    return rule(spur, config, [] if other_canes is None else [other_canes], keep_out)
+    others = [] if other_canes is None else [other_canes]
+    if config.system == "guyot":
+        return _prune_guyot(spur, config, others, keep_out, old_cane)
+    return _prune_spur(spur, config, others, keep_out)
 
 
 def cutting_force(radius: float) -> float:
@@ -169,20 +178,63 @@ def _prune_spur(spur: Spur, config: RuleConfig, others: list[Array], keep_out: K
     return Decision.of(results, _refusals(results)[:1])
 
 
-def _prune_guyot(spur: Spur, config: RuleConfig, others: list[Array], keep_out: KeepOut) -> Decision:
+def _prune_guyot(
+    spur: Spur, config: RuleConfig, others: list[Array], keep_out: KeepOut, old_cane: Cane | None
+) -> Decision:
+    own = [cane.axis for cane in spur.canes]
+    results: dict[CutKind, Cut | Reason] = {"removal": _remove(old_cane, [*own, *others], config, keep_out)}
+    canes = _two_canes(spur, config)
+    if isinstance(canes, Reason):
+        return Decision.of(results, (canes, *_refusals(results)))
+    lower, upper = canes
+    fruiting = replace(config, nodes_kept=config.fruiting_nodes)
+    results["spur cut"] = _shorten(_Keeper(lower, "lower", 2), [upper.axis, *others], config, keep_out)
+    results["cane cut"] = _shorten(_Keeper(upper, "upper", 2), [lower.axis, *others], fruiting, keep_out, True)
+    return Decision.of(results, _refusals(results))
+
+
+def _two_canes(spur: Spur, config: RuleConfig) -> tuple[Cane, Cane] | Reason:
+    """The lower and the upper cane of a Guyot vine's spur, or the reason why they cannot be told."""
     if spur.incomplete is not None:
-        return Decision(undecided=(spur.incomplete,))
+        return spur.incomplete
     if len(spur.canes) != 2:
-        return Decision(undecided=(reasons.not_two_canes(len(spur.canes)),))
+        return reasons.not_two_canes(len(spur.canes))
     lower, upper = sorted(spur.canes, key=lambda cane: float(cane.origin[2]))
     if float(upper.origin[2] - lower.origin[2]) < config.height_error:
-        return Decision(undecided=(reasons.canes_at_same_height(),))
-    fruiting = replace(config, nodes_kept=config.fruiting_nodes)
-    results: dict[CutKind, Cut | Reason] = {
-        "spur cut": _shorten(_Keeper(lower, "lower", 2), [upper.axis, *others], config, keep_out),
-        "cane cut": _shorten(_Keeper(upper, "upper", 2), [lower.axis, *others], fruiting, keep_out, True),
-    }
-    return Decision.of(results, (_OLD_CANE, *_refusals(results)))
+        return reasons.canes_at_same_height()
+    return lower, upper
+
+
+def _remove(old: Cane | None, others: list[Array], config: RuleConfig, keep_out: KeepOut) -> Cut | Reason:
+    """The cut that takes last year's cane off its head, at the first place from the trunk on where there is room."""
+    if old is None:
+        return reasons.old_cane_unseen()
+    if too_thick(old.radius, config):
+        return reasons.cane_beyond_shears(2000 * old.radius)
+
+    def refused(arc: float) -> Reason | None:
+        start, end = arc - _VISIBLE_HALF_WIDTH, arc + _VISIBLE_HALF_WIDTH
+        if end > old.length or any(span.overlaps(start, end) for span in old.hidden):
+            return reasons.cut_place_hidden()
+        return _obstructed(old.at(arc), others, config, keep_out)
+
+    places = np.arange(_STUMP, _LONGEST_STUMP + _STUMP_STEP / 2, _STUMP_STEP).tolist()
+    arc = next((place for place in places if refused(place) is None), None)
+    if arc is None:
+        return refused(_STUMP) or reasons.cut_place_hidden()
+    hidden = sum(max(0.0, min(span.end, arc) - span.start) for span in old.hidden) + old.base_gap
+    return Cut(
+        kind="removal",
+        position=old.at(arc),
+        tangent=old.tangent(arc),
+        radius=old.radius,
+        confidence=float(np.clip(1.0 - hidden / arc, 0.0, 1.0)),
+        nodes_seen=0,
+        nodes_kept=0,
+        reason=reasons.old_cane_removed(1000 * arc),
+        inward=_free(arc - (_STUMP - _SHORTER_STUMP), lambda shift: refused(arc - shift) is None),
+        outward=_free(_LONGEST_STUMP - arc, lambda shift: refused(arc + shift) is None),
+    )
 
 
 def _refusals(results: dict[CutKind, Cut | Reason]) -> tuple[Reason, ...]:

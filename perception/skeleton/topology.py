@@ -10,12 +10,12 @@ from perception.arrays import Array, Index, Labels, Mask, distance
 from perception.config import SkeletonConfig
 from perception.plant.model import SURFACE_OFFSET, Cane, Node, Plant, Span, Spur
 from perception.segmentation.depth_inpainting import inpaint_depth, interpolate_lost_depth
-from perception.segmentation.frame import CORDON, OLD_CUT, SPUR, TRUNK, View, class_pixels
+from perception.segmentation.frame import BACKGROUND, CANE, CORDON, NODE, OLD_CUT, SPUR, TRUNK, View, class_pixels
 from perception.skeleton.centreline import Centreline, base_radius, centrelines
 from perception.skeleton.fragments import find_cane_pixels, find_fragments
 from perception.skeleton.linking import link_fragments
 from rolling_panda import reasons
-from rolling_panda.messages.types import Reason
+from rolling_panda.messages.types import CutKind, Reason
 
 #: 8-connectivity.
 _CONNECTIVITY = np.ones((3, 3), dtype=bool)
@@ -29,6 +29,8 @@ _STUB_DEPTH, _STUB_ROUNDS, _STUB_ACROSS = 0.03, 2, 0.015
 _WIDTH = (5.0, 95.0)
 #: Stride of the cordon pixels, and number of pixels for a direction.
 _CORDON_STRIDE, _MIN_CORDON = 4, 50
+#: Last year's cane of a Guyot vine begins so near to its trunk, and ends at least so far from it (m).
+_AT_TRUNK, _FROM_TRUNK = 0.03, 0.06
 
 
 def perceive_plant(view: View, labels: Labels, config: SkeletonConfig) -> Plant:
@@ -52,6 +54,35 @@ def trace_canes(view: View, labels: Labels, config: SkeletonConfig, measured_onl
     if measured_only:
         whole = replace(whole, depth=np.where(measured, whole.depth, np.float32(0.0)))
     return _trace(whole, labels, measured, config)
+
+
+def trace_old_canes(view: View, labels: Labels, config: SkeletonConfig) -> list[Cane]:
+    """Last year's canes of Guyot vines, each from where it leaves its trunk; arguments as of `perceive_plant`.
+
+    They are laid along the row and have the class of a cordon.
+    """
+    trunks = _clouds(view, labels, (TRUNK,), _MIN_TRUNK, config)
+    if not trunks:
+        return []
+    tree, out = cKDTree(np.concatenate(trunks)), []
+    for line in trace_canes(view, wood_of_cut(labels, "removal"), config):
+        gaps, _ = tree.query([line.axis[0], line.axis[-1]])
+        if gaps.min() < _AT_TRUNK and gaps.max() > _FROM_TRUNK:
+            out.append(_cane(line, bool(gaps[1] < gaps[0]), float(gaps.min())))
+    return out
+
+
+def wood_of_cut(labels: Labels, kind: CutKind) -> Labels:
+    """The classes (H×W) with the wood that a cut of a kind severs as canes.
+
+    A renewal cut is on a stub, and a removal on last year's cane, whose class is that of a cordon.
+    """
+    if kind == "renewal cut":
+        return np.where(labels == SPUR, np.uint8(CANE), labels)
+    if kind == "removal":
+        others = np.where(np.isin(labels, (CANE, NODE)), np.uint8(BACKGROUND), labels)
+        return np.where(labels == CORDON, np.uint8(CANE), others)
+    return labels
 
 
 def _mended(view: View, labels: Labels, config: SkeletonConfig) -> tuple[View, Mask]:

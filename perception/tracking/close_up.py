@@ -14,10 +14,10 @@ import numpy as np
 from perception.arrays import Array, interpolate
 from perception.config import CloseUpConfig, PerceptionConfig
 from perception.plant.map import NOTHING_KNOWN, Surroundings
-from perception.segmentation.frame import CANE, SPUR, View
+from perception.segmentation.frame import View
 from perception.segmentation.segmenter import Segmenter
 from perception.skeleton.centreline import Centreline
-from perception.skeleton.topology import trace_canes
+from perception.skeleton.topology import trace_canes, wood_of_cut
 from perception.tracking.picture_shift import UNSHIFTED, PictureShift, picture_shift
 from perception.tracking.presence import wood_presence
 from rolling_panda import messages as m
@@ -139,11 +139,11 @@ def check_close_up(
     by = expected if shift is None else shift.by
     position = accepted + by
     probe = position + limits.probe_distance * along
-    beyond = wood_presence(part, labels, probe)[0]
-    cane = _cane_at(position, along, lines, limits)
+    beyond = wood_presence(part, labels, probe, kind=point.kind)[0]
+    cane = None if point.kind == "removal" else _cane_at(position, along, lines, limits)
     if cane is None:
-        # A renewal cut is on a stub.
-        wood = np.where(labels == SPUR, np.uint8(CANE), labels)
+        # A cane hides its base, where it leaves the stub.
+        wood = wood_of_cut(labels, "removal" if point.kind == "removal" else "renewal cut")
         cane = _cane_at(position, along, trace_canes(part, wood, config.skeleton), limits)
     gone = beyond == "gone" and not _may_stand_aside(probe, along, lines, known, shift, limits)
     if cane is None:

@@ -11,14 +11,14 @@ import numpy as np
 
 from perception.arrays import Array
 from perception.config import PerceptionConfig, SightConfig
-from perception.segmentation.frame import CANE, SPUR, View
+from perception.segmentation.frame import View
 from perception.segmentation.segmenter import Segmenter
 from perception.skeleton.centreline import Centreline
-from perception.skeleton.topology import trace_canes
+from perception.skeleton.topology import trace_canes, wood_of_cut
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.messages.perception import CloseUpResult, CutSight
-from rolling_panda.messages.types import Covariance, Reason
+from rolling_panda.messages.types import Covariance, CutKind, Reason
 from rolling_panda.model.wire_values import vector3
 
 #: SD of a cane's place in a picture: across the view (px) and in depth (m), as measured on rendered pictures.
@@ -33,7 +33,7 @@ class _Followed:
     number: int
     position: Array
     tangent: Array
-    stub: bool
+    kind: CutKind
     stamp: float
 
 
@@ -45,12 +45,12 @@ class CutFollower:
         self._config, self._limits = config, config.sight
         self._followed: _Followed | None = None
 
-    def begin(self, check: CloseUpResult, stub: bool) -> None:
-        """Follow the cut where a close-up has seen it; one that has not ends it. `stub`: the cut is on a stub."""
+    def begin(self, check: CloseUpResult, kind: CutKind) -> None:
+        """Follow a cut of a kind where a close-up has seen it; one that has not ends it."""
         self._followed = None
         if check.finding == "seen" and check.position is not None and check.tangent is not None:
             place, along = np.array(check.position), np.array(check.tangent)
-            self._followed = _Followed(check.point_id, check.number, place, along, stub, check.header.stamp)
+            self._followed = _Followed(check.point_id, check.number, place, along, kind, check.header.stamp)
 
     def forget(self) -> None:
         """Follow nothing."""
@@ -94,9 +94,7 @@ class CutFollower:
         if not (half <= u < width - half and half <= v < height - half):
             return reasons.place_outside_picture()
         part = view.part(slice(round(v) - half, round(v) + half), slice(round(u) - half, round(u) + half))
-        labels = segmenter.segment(part)
-        if known.stub:
-            labels = np.where(labels == SPUR, np.uint8(CANE), labels)
+        labels = wood_of_cut(segmenter.segment(part), known.kind)
         lines = trace_canes(part, labels, self._config.skeleton)
         crossings = _crossings(view, known, lines, limits)
         if not crossings:

@@ -5,7 +5,8 @@ from typing import Literal
 import numpy as np
 
 from perception.arrays import Array, Labels
-from perception.segmentation.frame import CANE, NODE, POST, SPUR, TRUNK, View
+from perception.segmentation.frame import CANE, CORDON, NODE, POST, SPUR, TRUNK, View
+from rolling_panda.messages.types import CutKind
 
 #: Largest depth difference of the same wood (m).
 _SAME_DEPTH = 0.025
@@ -21,7 +22,9 @@ _OTHER_ROW = 0.8
 Presence = Literal["present", "gone", "not visible"]
 
 
-def wood_presence(view: View, labels: Labels, positions: Array, aside: float = SEARCH_RADIUS) -> list[Presence]:
+def wood_presence(
+    view: View, labels: Labels, positions: Array, aside: float = SEARCH_RADIUS, kind: CutKind = "spur cut"
+) -> list[Presence]:
     """Presence of spur, cane or node at positions on the axis of the wood (N×3, m, odom).
 
     Args:
@@ -29,11 +32,13 @@ def wood_presence(view: View, labels: Labels, positions: Array, aside: float = S
         labels: H×W class indices.
         positions: To check.
         aside: How far aside it may be seen (m).
+        kind: Of the cut of that wood. That of a removal may have the class of a cordon, too.
     """
-    return [_at(view, labels, u, v, z, aside) for u, v, z in view.pixels(positions).tolist()]
+    classes = (CANE, NODE, SPUR, CORDON) if kind == "removal" else (CANE, NODE, SPUR)
+    return [_at(view, labels, u, v, z, aside, classes) for u, v, z in view.pixels(positions).tolist()]
 
 
-def _at(view: View, labels: Labels, u: float, v: float, z: float, aside: float) -> Presence:
+def _at(view: View, labels: Labels, u: float, v: float, z: float, aside: float, classes: tuple[int, ...]) -> Presence:
     height, width = view.depth.shape
     radius = max(2, round(view.intrinsics.fx * aside / max(z, 0.1)))
     if z < _MIN_DEPTH or not (radius <= u < width - radius - 1 and radius <= v < height - radius - 1):
@@ -41,7 +46,7 @@ def _at(view: View, labels: Labels, u: float, v: float, z: float, aside: float) 
     row, col = round(v), round(u)
     window = slice(row - radius, row + radius + 1), slice(col - radius, col + radius + 1)
     depth = view.depth[window]
-    wood = np.isin(labels[window], (CANE, NODE, SPUR))
+    wood = np.isin(labels[window], classes)
     if (wood & (np.abs(depth - z) < _SAME_DEPTH)).any():
         return "present"
     nearer = (depth > 0.0) & (depth < z - _SAME_DEPTH)

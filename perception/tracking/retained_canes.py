@@ -138,7 +138,7 @@ class RetainedCanes:
     def select(self, spurs: Iterable[KnownSpur], cuts: Sequence[Proposal], rule: RuleConfig) -> None:
         """Select the retained canes of some spurs again; arguments as of `update`."""
         for spur in spurs:
-            here = [proposal.cut for proposal in cuts if proposal.number == spur.number]
+            here = [each.cut for each in cuts if each.number == spur.number and each.cut.kind != "removal"]
             canes = [self._canes.setdefault((spur.number, k), _Cane()) for k in range(len(spur.canes))]
             arcs: dict[int, float] = {}
             chosen: set[int] = set()

@@ -268,7 +268,8 @@ def _wood(spur: KnownSpur, point: PruningPoint) -> _Wood:
         falling = {at: _sampled(cane)[0] for at, cane in beyond.items() if at > 0.0}
         ends = np.array([-_STUB, 0.0, max(falling, default=_STUB)])
         return _Wood(position + ends[:, None] * tangent, ends, also_falls=tuple(falling.values()))
-    near = [(_nearest(cane.as_cane(), position), cane.as_cane()) for cane in spur.canes]
+    own = [] if point.kind == "removal" else [known.as_cane() for known in spur.canes]
+    near = [(_nearest(each, position), each) for each in own]
     (gap, arc), cane = min(near, key=lambda each: each[0][0], default=((np.inf, 0.0), None))
     if cane is None or gap > _ON_CANE:
         ends = np.array([-_STUB, _STUB])

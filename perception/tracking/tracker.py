@@ -337,6 +337,11 @@ class Tracker:
             if t.published is not None
         )
 
+    @property
+    def sites(self) -> set[Site]:
+        """Spurs and kinds of all cuts that were proposed, published or not."""
+        return {track.site for track in self._tracks}
+
     def _start(self, proposal: Proposal) -> _Track:
         self._last_id += 1
         self._tracks.append(_Track.of(f"p{self._last_id}", proposal))
@@ -368,7 +373,7 @@ class Tracker:
         `competing` has the hits of the supported track of each site.
         """
         probe = track.position + self._config.probe_distance * track.tangent
-        presence = wood_presence(view, labels, probe, track.sway)[0]
+        presence = wood_presence(view, labels, probe, track.sway, track.cut.kind)[0]
         if presence == "not visible":
             return None
         track.gone = track.gone + 1 if presence == "gone" else 0
@@ -417,7 +422,7 @@ class Tracker:
     def unconfirmed(self) -> set[Site]:
         """Spurs and kinds of cuts that were proposed, but not by enough frames and viewpoints for a point."""
         published = {track.site for track in self._tracks if track.published is not None}
-        return {track.site for track in self._tracks} - published - self._moved()
+        return self.sites - published - self._moved()
 
     def _moved(self) -> set[Site]:
         """Sites whose cut an operator has moved."""

@@ -57,7 +57,7 @@ def following(cut: RightCut, aside: float = 0.0) -> CutFollower:
         position=place,
         tangent=vector3(cut.tangent),
     )
-    follower.begin(check, stub=False)
+    follower.begin(check, kind="spur cut")
     return follower
 
 
@@ -144,5 +144,5 @@ def test_what_no_close_up_has_seen_is_not_followed() -> None:
             other = look(follower, seen, "p2")
             assert other.position is None and other.reason == reasons.cut_not_followed()
     follower = following(cut)
-    follower.begin(CloseUpResult(header=m.Header(1.05), point_id="p1", number=2, finding="unseen"), stub=False)
+    follower.begin(CloseUpResult(header=m.Header(1.05), point_id="p1", number=2, finding="unseen"), kind="spur cut")
     assert look(follower, seen).reason == reasons.cut_not_followed()

@@ -19,7 +19,7 @@ export type JointOffsets = [number, number, number, number, number, number, numb
 
 export type Covariance = [number, number, number, number, number, number];
 
-export type CutKind = "spur cut"|"renewal cut"|"cane cut"|"by hand";
+export type CutKind = "spur cut"|"renewal cut"|"cane cut"|"removal"|"by hand";
 
 export type Need = "another look"|"operator"|"nothing";
 
