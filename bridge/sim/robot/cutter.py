@@ -100,9 +100,9 @@ class Cutter:
 def close_blades(row: Row, T_world_tool: Array, config: BridgeConfig) -> CutResult:
     """Close the blades on the row.
 
-    A cane, spur or node, or last year's cane of a Guyot vine, is severed where its axis crosses the blade plane (through
-    the tool's origin, normal to its y) between the blades. Any part of a wire, post, trunk or permanent cordon, or too
-    thick wood, between the blades jams them, and nothing is severed.
+    A cane, spur or node, or last year's cane of a Guyot vine, is severed where its axis crosses the blade plane
+    (through the tool's origin, normal to its y) between the blades. Any part of a wire, post, trunk or permanent
+    cordon, or too thick wood, between the blades jams them, and nothing is severed.
 
     Args:
         row: The row.
