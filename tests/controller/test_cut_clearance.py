@@ -450,8 +450,8 @@ def old_cane(start, end, vine=1, spur=1, radius=0.007):
     return Capsule("cordon", *ends, radius, radius, vine, spur)
 
 
-def lying(side=1.0):
-    """The piece after the bow, along the row, and the head with the trunk below it."""
+def lying():
+    """The piece after the bow, along the row."""
     corner = POINT + 0.1 * BOW
     return Capsule("cordon", tuple(corner.tolist()), tuple((corner + [0.3, 0.0, 0.0]).tolist()), 0.0065, 0.006, 1, 1)
 
@@ -505,11 +505,22 @@ def test_a_removal_takes_no_cane_of_the_spur_beside_last_years_cane(number):
 
 def test_open_blades_that_remove_last_years_cane_push_no_shoot_of_it():
     """The shoot falls with it, but it stands while the blades come in."""
-    foot = POINT + [0.026, 0.0, 0.0]
+    foot = POINT + 0.024 * np.array([-0.6, 0.0, 0.8])
     shoot = (tuple(foot.tolist()), tuple((foot + [0.0, 0.0, 0.3]).tolist()))
     free, plan = removal(old_cane(-0.06, 0.1)), removal(old_cane(-0.06, 0.1), standing=(shoot,))
     assert isinstance(free, CutPlan) and isinstance(plan, CutPlan)
     assert way_room(free, shoot) < 0.003 <= way_room(plan, shoot)
+
+
+def test_a_shoot_between_the_blades_leaves_no_room_for_a_removal_however_near_to_the_cut_it_grows():
+    foot = POINT + 0.013 * np.array([-0.6, 0.0, 0.8])
+    shoot = (tuple(foot.tolist()), tuple((foot + [0.0, 0.0, 0.3]).tolist()))
+    cut = point("p1", tuple(POINT.tolist()), tuple(BOW.tolist()), vine=1, spur=1, cane=-1, kind="removal")
+    clearance = CutClearance(RobotModel(), SETTINGS)
+    nothing = Received(Obstacles(header=m.Header(0.0, "odom"), capsules=()), 0.0)
+    clearance.update(nothing, (shoot,))
+    square = cut_poses(POINT, BOW, np.array([0.0, 1.0, 0.0]), 0.1, 0.2)
+    assert clearance.beside(square, cut) < 0.0
 
 
 def test_where_a_close_up_sees_last_years_cane_it_is_removed_there():
