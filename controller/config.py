@@ -171,7 +171,7 @@ class WorkConfig(Struct, frozen=True, forbid_unknown_fields=True):
         reach_timeout_s: A motion fails this long after its planned end (s).
         cut_timeout_s: A cut without an outcome for this long is UNKNOWN (s).
         largest_radius: Canes with a larger radius are refused (m).
-        largest_stub_radius: Stubs of two-year wood with a larger radius are refused (m).
+        largest_stub_radius: Two-year wood, stubs and last year's cane, with a larger radius is refused (m).
         survey_speed: Speed of the base on a survey (m/s). At two pictures a second there is one every 0.125 m.
         pre_cut_check: Whether a close-up checks each point before its cut.
         post_cut_check: Whether a close-up checks each cut; otherwise the cutter's report counts.

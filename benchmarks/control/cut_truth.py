@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -12,8 +12,6 @@ from rolling_panda.messages.types import CutKind
 
 #: In place of a cane's number: the stub, and last year's cane of a Guyot vine.
 STUB, OLD_CANE = -1, -2
-#: What a cut is for. The removal of last year's cane is never proposed, so that no message has that kind.
-WantedKind = CutKind | Literal["removal"]
 #: Cane's number of wood that is no cane, by class, and what stays below its cut.
 _WOOD = {"spur": STUB, "cordon": OLD_CANE}
 _STAYS = {STUB: "the cane", OLD_CANE: "the head"}
@@ -35,7 +33,7 @@ class WantedCut:
     vine: int
     spur: int
     cane: int
-    kind: WantedKind
+    kind: CutKind
     cut: RightCut | None
     nodes: Array
 
@@ -96,9 +94,7 @@ def true_cut(wanted: Iterable[WantedCut], pieces: Iterable[Mapping[str, Any]]) -
     right, harm, cane, nodes, past = False, "", False, None, None
     for piece in pieces:
         place, number = np.array(piece["point"]), _WOOD.get(piece["kind"], piece["cane"])
-        # A Guyot vine has one spur; last year's cane is beside it and has none.
-        spur = 0 if number == OLD_CANE else piece["spur"]
-        found = known.get((piece["vine"], spur, number))
+        found = known.get((piece["vine"], piece["spur"], number))
         if found is None:
             continue
         stub = number == STUB

@@ -3,9 +3,7 @@
 Grown rows before the first cut, without a simulation and without perception: the search gets the right cuts and all
 wood by the truth. The search and its distances are those of the controller.
 
-Perception proposes no removal of last year's cane of a Guyot vine, and the controller keeps off it as off a cordon.
-Here its first piece, up to the first shoot, is no obstacle to its removal. The whole stretch where that is right is
-searched.
+The whole stretch where the removal of last year's cane of a Guyot vine is right is searched.
 """
 
 import dataclasses
@@ -18,7 +16,7 @@ from msgspec.structs import replace
 
 from benchmarks.common.documents import bench_parser, write
 from benchmarks.common.intervals import Figure, share
-from benchmarks.control.cut_truth import STUB, WantedCut, WantedKind, wanted_cuts
+from benchmarks.control.cut_truth import STUB, WantedCut, wanted_cuts
 from benchmarks.perception.blocked import Blocker, blocked_by
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
@@ -41,14 +39,12 @@ from rolling_panda.transport.inbox import Received
 #: Wood that stands in the way and is never cut.
 _FIXED = ("post", "trunk", "cordon", "wire", "hose")
 #: Kinds of the right cuts, by training system.
-KINDS: dict[str, tuple[WantedKind, ...]] = {
+KINDS: dict[str, tuple[CutKind, ...]] = {
     "spur": ("spur cut", "renewal cut"),
     "guyot": ("spur cut", "cane cut", "removal"),
 }
 #: Distance of two places of a removal that are searched (m).
 _REMOVAL_STEP = 0.01
-#: Last year's cane has the number of its first shoot in place of a spur's: the canes of the spur stay beside its cut.
-_FIRST_SHOOT = 1
 
 
 @dataclass(frozen=True)
@@ -98,8 +94,7 @@ class Oracle:
             cut: Where it is right.
         """
         removal = wanted.kind == "removal"
-        obstacles = obstacles_of(row, self._guyot, cut.rod if removal else None)
-        self._clearance.update(Received(obstacles, 0.0), cane_lines(row))
+        self._clearance.update(Received(obstacles_of(row, self._guyot), 0.0), cane_lines(row))
         q = np.zeros(12)
         q[0], q[ARM_Q] = float(cut.best[0]), self._home
         point, refused = point_of(row, wanted, cut, self._guyot), list[str]()
@@ -119,14 +114,14 @@ def _along(cut: RightCut) -> list[float]:
 
 
 def point_of(row: Row, wanted: WantedCut, cut: RightCut, guyot: bool = False) -> m.PruningPoint:
-    """A right cut as perception would tell it, if it saw everything as it is; a removal as a cut of a stub is told."""
+    """A right cut as perception would tell it, if it saw everything as it is."""
     rod = row.rods[cut.rod]
     assert rod is not None
     spur = wanted.vine, wanted.spur
     own = (each for each in wanted_cuts(row, guyot) if (each.vine, each.spur) == spur)
     staying = next(each.cane for each in own if each.cane >= 0)
     removal = wanted.kind == "removal"
-    kind: CutKind = "renewal cut" if wanted.kind == "removal" else wanted.kind
+    kept = FRUITING_NODES if wanted.kind == "cane cut" else KEPT_NODES
     point = m.PruningPoint(
         point_id="truth",
         revision=1,
@@ -135,11 +130,11 @@ def point_of(row: Row, wanted: WantedCut, cut: RightCut, guyot: bool = False) ->
         radius=rod.start_radius,
         confidence=1.0,
         nodes_seen=len(wanted.nodes),
-        nodes_kept=FRUITING_NODES if kind == "cane cut" else KEPT_NODES,
+        nodes_kept=0 if removal else kept,
         reason=reasons.said("By the truth."),
         vine=wanted.vine,
-        spur=_FIRST_SHOOT if removal else wanted.spur,
-        kind=kind,
+        spur=wanted.spur,
+        kind=wanted.kind,
         cane=staying if wanted.cane == STUB else max(wanted.cane, -1),
         inward=0.0 if removal else min(INWARD, -cut.past_best(cut.least)),
         outward=0.0 if removal else min(OUTWARD, cut.past_best(cut.most)),
@@ -147,8 +142,8 @@ def point_of(row: Row, wanted: WantedCut, cut: RightCut, guyot: bool = False) ->
     return replace(point, digest=point_digest(point))
 
 
-def obstacles_of(row: Row, guyot: bool = False, removed: int | None = None) -> Obstacles:
-    """All that stands in the way, and the canes that stay, in the world frame; `removed` is a rod that does not."""
+def obstacles_of(row: Row, guyot: bool = False) -> Obstacles:
+    """All that stands in the way, and the canes that stay, in the world frame."""
     staying = staying_rods(row, guyot)
     capsules = [
         Capsule(
@@ -162,7 +157,7 @@ def obstacles_of(row: Row, guyot: bool = False, removed: int | None = None) -> O
             cane=rod.cane,
         )
         for number, rod in row.standing()
-        if number != removed and (rod.kind in _FIXED or number in staying)
+        if rod.kind in _FIXED or number in staying
     ]
     return Obstacles(header=m.Header(0.0, "map"), capsules=tuple(capsules))
 
@@ -192,7 +187,7 @@ def look(oracle: Oracle, seed: int, vines: int, guyot: bool = False) -> list[Fou
     return found
 
 
-def summarise(found: Sequence[Found], kinds: Sequence[WantedKind] = KINDS["spur"]) -> dict[str, Figure]:
+def summarise(found: Sequence[Found], kinds: Sequence[CutKind] = KINDS["spur"]) -> dict[str, Figure]:
     """Shares with a plan, of the cuts with room for the blades and of those without, of all and of each kind."""
     out = {}
     for name in ("room", "no room"):

@@ -630,7 +630,9 @@ def places(
     proposed: dict[tuple[int, int, str], list[str]] = {}
     for point in reviewer.points.values() if asked else ():
         rod = nearest_rod(row, np.array(point.position))[1]
-        proposed.setdefault((rod.vine, rod.spur, point.kind), []).append(point.point_id)
+        # Last year's cane may be told beside its first shoot, which has a spur's number of its own.
+        spur = 0 if point.kind == "removal" else rod.spur
+        proposed.setdefault((rod.vine, spur, point.kind), []).append(point.point_id)
     left = [(_spur_at(row, site), codes(site.reason)) for site in sites]
     of_spurs = {spur: reason for spur, reason in left if reason != _OLD_CANE_LEFT}
     of_old_canes = of_spurs | {spur: reason for spur, reason in left if reason == _OLD_CANE_LEFT}

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from controller.config import HierarchyConfig
-from controller.motion.surroundings import obstacles_of, touchable
+from controller.motion.surroundings import WorkPlace, obstacles_of, removable, touchable
 from controller.planning.preview_plan import STEP, Preview, SweptVolume
 from controller.whole_body.collision_geometry import BLADES
 from controller.whole_body.compiled import NOTHING, NUMBER, PACKED, VECTOR, compiled
@@ -69,8 +69,11 @@ class PathWatch:
         if not len(spots):
             return None
         canes = tuple(capsule for capsule in now if capsule.kind == "cane")
-        axes = Axes(tuple(obstacles_of(canes)))
-        points = {point.point_id: np.array(point.position) for point in self._preview.request.points}
+        cordons = tuple(capsule for capsule in now if capsule.kind == "cordon")
+        axes, cordon_axes = Axes(tuple(obstacles_of(canes))), Axes(tuple(obstacles_of(cordons)))
+        points = {
+            point.point_id: WorkPlace.of(np.array(point.position), point) for point in self._preview.request.points
+        }
         cuts = self._preview.cuts
         begun = not first
         worst, found = 0.0, None
@@ -80,6 +83,7 @@ class PathWatch:
                 continue
             places = [points[each.point_id] for each in cuts[number : number + 2]]
             touched = {canes[index] for index in touchable(canes, axes, places)}
+            touched |= {cordons[index] for index in removable(cordons, cordon_axes, places)}
             needed = self._needed(fresh, spots, cut, touched)
             lacking, part, spot, distance = self._worst(self._ways[number], spots, needed)
             if lacking > worst:

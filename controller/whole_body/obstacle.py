@@ -67,6 +67,11 @@ class Axes:
         """Both ends of one (2×3, m)."""
         return np.array([self._start[number], self._start[number] + self._along[number]])
 
+    def away(self, place: Array) -> Array:
+        """Distances of the n axes from a place (3, m)."""
+        away: Array = self.gaps(place[None], np.zeros(1))[0] + self._radius
+        return away
+
     def gaps(self, centers: Array, radii: Array) -> Array:
         """Gaps (g×n, m) between g spheres and the n obstacles; negative where they overlap."""
         gaps = np.empty((len(centers), len(self._start)))

@@ -20,6 +20,7 @@ import numpy as np
 from controller.config import ControllerConfig, WorkConfig
 from controller.motion.contact import ContactMonitor, Touch
 from controller.motion.follower import Follower, Measured, MotionTimeout, Tracking, missed
+from controller.motion.surroundings import WorkPlace
 from controller.motion.tool_motion import Leg, ToolMotion
 from controller.whole_body.saturation import Saturation
 from controller.work.back_off import BackOff, Trail
@@ -341,6 +342,11 @@ class CutTask:
         return self.planned.in_odom(self.frame)
 
     @property
+    def work_place(self) -> WorkPlace:
+        """Where the blades work, in odom."""
+        return WorkPlace.of(self.plan.poses.cut.translation, self.accepted)
+
+    @property
     def accepted_in_odom(self) -> Array | None:
         """Place of the acceptance (3, m, odom); None without one."""
         return None if self.accepted is None else self.frame.position_in_odom(np.array(self.accepted.position))
@@ -375,8 +381,8 @@ class Stage(ABC):
         return None
 
     @property
-    def plans(self) -> tuple[CutPlan, ...]:
-        """Plans of the cuts that the motion begins or ends at, in odom."""
+    def tasks(self) -> tuple[CutTask, ...]:
+        """The cuts that the motion begins or ends at."""
         return ()
 
     def hold(self) -> None:
@@ -626,9 +632,9 @@ class TaskStage(Stage):
         return self._task.plan
 
     @property
-    def plans(self) -> tuple[CutPlan, ...]:
-        """Plans of the cuts that the motion begins or ends at, in odom."""
-        return (self._task.plan,)
+    def tasks(self) -> tuple[CutTask, ...]:
+        """The cuts that the motion begins or ends at."""
+        return (self._task,)
 
 
 class MovingStage(TaskStage):
@@ -990,9 +996,9 @@ class Retreat(LeavingStage):
         self._way, self._onwards = way, onwards
 
     @property
-    def plans(self) -> tuple[CutPlan, ...]:
-        """Plans of the cuts that the motion begins or ends at."""
-        return (self._task.plan,) if self._onwards is None else (self._task.plan, self._onwards.plan)
+    def tasks(self) -> tuple[CutTask, ...]:
+        """The cuts that the motion begins or ends at."""
+        return (self._task,) if self._onwards is None else (self._task, self._onwards)
 
     def step(self, robot: Measured, now: float) -> Step:
         """One period."""
@@ -1122,7 +1128,7 @@ class CutSequence:
         self._survey: Survey | None = None
         #: The push on the last way out, which may last until the next way in has begun.
         self._pushed: Touch | None = None
-        self._places: tuple[Array, ...] = ()
+        self._places: tuple[WorkPlace, ...] = ()
 
     @property
     def phase(self) -> m.Phase:
@@ -1150,8 +1156,8 @@ class CutSequence:
         return self._stage.plan
 
     @property
-    def places(self) -> tuple[Array, ...]:
-        """Cuts that the motion under way begins or ends at (3, m, odom): the blades may touch the spurs there."""
+    def places(self) -> tuple[WorkPlace, ...]:
+        """Cuts that the motion under way begins or ends at (odom): the blades may touch the wood there."""
         return self._places
 
     @property
@@ -1294,7 +1300,7 @@ class CutSequence:
             now: Monotonic time (s).
         """
         self._stage, result = self._stage.step(robot, now)
-        if plans := self._stage.plans:
-            # While the tool leaves the canes there is no plan; it is still near the last cut.
-            self._places = tuple(plan.poses.cut.translation for plan in plans)
+        if tasks := self._stage.tasks:
+            # While the tool leaves the canes there is no cut under way; it is still near the last one.
+            self._places = tuple(task.work_place for task in tasks)
         return result

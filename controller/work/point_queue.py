@@ -234,8 +234,8 @@ class PointQueue:
             return reasons.point_revised(point_id, revision, ticket.point.revision)
         if digest and digest != ticket.point.digest:
             return reasons.point_replaced(point_id, ticket.point.digest[:8] or "unknown", digest[:8])
-        radius, stub = ticket.point.radius, ticket.point.kind == "renewal cut"
-        largest = self._config.largest_stub_radius if stub else self._config.largest_radius
+        radius, old_wood = ticket.point.radius, ticket.point.kind in ("renewal cut", "removal")
+        largest = self._config.largest_stub_radius if old_wood else self._config.largest_radius
         if radius > largest:
             return reasons.cane_too_thick(point_id, 2e3 * radius, 2e3 * largest)
         return None

@@ -18,7 +18,7 @@ import numpy as np
 import pinocchio as pin
 
 from controller.config import HierarchyConfig, WorkConfig
-from controller.motion.surroundings import Surroundings
+from controller.motion.surroundings import Surroundings, WorkPlace
 from controller.whole_body.collision import CollisionModel, Pair
 from controller.whole_body.collision_geometry import BLADES
 from controller.whole_body.obstacle import Axes, Obstacle
@@ -148,7 +148,7 @@ APPROACHES: tuple[Approach, ...] = (
 #: Tilts for an azimuth set by a person (rad), in order of preference.
 TILTS = (0.0, 0.2, 0.26, -0.26)
 #: Where none of these has room: turns, tilts and leans in all combinations, the smallest first. The blades lean to pass
-#: a cane that stays, as a person's shears do: a slanting cut is usual between nodes, and on a stub more so.
+#: a cane that stays, as a person's shears do: a slanting cut is usual between nodes, and on two-year wood more so.
 _TURNS, _TILTS = (0.0, 0.35, 0.7), (0.0, 0.13, 0.26)
 _LEANS, _STUB_LEANS = (0.0, 0.13, 0.26, 0.4, 0.55), (0.0, 0.2, 0.4, 0.6, 0.8)
 #: Places of a cut along its wood in order of preference (m), as far as its point allows them.
@@ -187,7 +187,7 @@ def approaches(azimuth: float | None, kind: CutKind) -> tuple[Approach, ...]:
     """
     usual = APPROACHES if azimuth is None else tuple((azimuth, tilt, 0.0) for tilt in TILTS)
     turns = _both(_TURNS) if azimuth is None else (azimuth,)
-    leans = _both(_STUB_LEANS if kind == "renewal cut" else _LEANS)
+    leans = _both(_STUB_LEANS if kind in ("renewal cut", "removal") else _LEANS)
     more = sorted(product(turns, _both(_TILTS), leans), key=lambda each: abs(each[0]) / 2 + abs(each[1]) + abs(each[2]))
     return usual + tuple(each for each in more if each not in usual)
 
@@ -327,13 +327,13 @@ class PostureSearch:
             if not passed.near and not passed.tight:
                 return Unreachable(self._beyond(np.array(point.position), q))
         for _, along, approach, poses in sorted(passed.tight, key=lambda each: _WORTH * abs(each[1]) - each[0]):
-            if (plan := (yield from self._best(poses, approach, q, passed))) is not None:
+            if (plan := (yield from self._best(poses, approach, point, q, passed))) is not None:
                 return replace(plan, along=along)
         if not passed.near:
             return Unreachable(self._beyond(np.array(point.position), q))
         # Better slowly past something than not at all.
         for _, along, approach, poses in sorted(passed.narrow, key=lambda each: each[0]):
-            if (plan := (yield from self._best(poses, approach, q, passed, spare=False))) is not None:
+            if (plan := (yield from self._best(poses, approach, point, q, passed, spare=False))) is not None:
                 return replace(plan, along=along)
         return Unreachable(reasons.no_clear_posture(min(passed.near, key=lambda each: each[0])[1]))
 
@@ -379,7 +379,7 @@ class PostureSearch:
                 yield
                 continue
             # A good posture with the straight approach is preferred to a better one from the side.
-            if (plan := (yield from self._best(poses, approach, q, passed))) is not None:
+            if (plan := (yield from self._best(poses, approach, point, q, passed))) is not None:
                 return replace(plan, along=along)
         return None
 
@@ -426,7 +426,10 @@ class PostureSearch:
             if why is None:
                 left -= 1
                 found = yield from self._try(poses, plan.q_stand_off, plan.q_stand_off[ARM_Q])
-                why = self._beyond(seen, plan.q_cut) if found is None else self._clearance.too_near(found, spare)[1]
+                if found is None:
+                    why = self._beyond(seen, plan.q_cut)
+                else:
+                    why = self._clearance.too_near(found, point, spare)[1]
                 if found is not None and why is None:
                     return Fitted(replace(found, approach=approach, along=along), lacking)
                 yield
@@ -465,7 +468,13 @@ class PostureSearch:
         return [planned, *sorted(others, key=lambda each: (math.dist(each, planned), each))]
 
     def _best(
-        self, poses: CutPoses, approach: Approach, q: Array, passed: "_PassedOver", spare: bool = True
+        self,
+        poses: CutPoses,
+        approach: Approach,
+        point: PruningPoint,
+        q: Array,
+        passed: "_PassedOver",
+        spare: bool = True,
     ) -> Generator[None, None, CutPlan | None]:
         """The first good plan with an approach, else the best one. Adds obstacles to `passed`."""
         config, position = self._config, poses.cut.translation
@@ -482,7 +491,7 @@ class PostureSearch:
                 if plan is None:
                     continue
                 plan = replace(plan, approach=approach)
-                lacking, nearest = self._clearance.too_near(plan, spare)
+                lacking, nearest = self._clearance.too_near(plan, point, spare)
                 if nearest is not None:
                     passed.near.append((lacking, nearest))
                     continue
@@ -685,18 +694,19 @@ class CutClearance:
             self._axes = Axes(tuple(Obstacle("", "cane", start, end, _THIN) for _, start, end in pieces))
             self._line_of = np.array([number for number, _, _ in pieces], dtype=int)
 
-    def too_near(self, plan: CutPlan, spare: bool = True) -> tuple[float, Reason | None]:
+    def too_near(self, plan: CutPlan, point: PruningPoint, spare: bool = True) -> tuple[float, Reason | None]:
         """Largest violation of a required distance (m), with its place and parts; None without one.
 
-        Places: at the cut, at the stand-off and clear of the canes. The blades may touch the spur that is cut.
+        Places: at the cut, at the stand-off and clear of the canes. The blades may touch the wood that is cut.
 
         Args:
             plan: The plan.
+            point: The cut.
             spare: Whether it has the room of a plan, beyond what the guard needs on the way.
         """
         if not self._settings.collisions:
             return 0.0, None
-        self._surroundings.work_at((plan.poses.cut.translation,))
+        self._surroundings.work_at((WorkPlace.of(plan.poses.cut.translation, point),))
         places: tuple[tuple[reasons.Place, Array], ...] = (
             ("at the cut", plan.q_cut),
             ("at the stand-off", plan.q_stand_off),
@@ -712,7 +722,7 @@ class CutClearance:
         """The same of the tool alone, which no posture of the arm changes, all along its way in.
 
         A cane that stays, or may stay, must not be between the blades either, nor a wire, post, trunk or cordon, though
-        they would pass it open.
+        they would pass it open; of last year's cane the piece may that is removed.
 
         Args:
             poses: Of the tool.
@@ -721,7 +731,7 @@ class CutClearance:
         """
         if not self._settings.collisions:
             return 0.0, None
-        self._surroundings.work_at((poses.cut.translation,))
+        self._surroundings.work_at((WorkPlace.of(poses.cut.translation, point),))
         places: tuple[tuple[reasons.Place, Any], ...] = (
             ("at the cut", poses.cut),
             *(("on the way in", pose) for pose in poses.between),
@@ -731,7 +741,7 @@ class CutClearance:
         found = self._surroundings.model.tool_distances([pose for _, pose in places], self._within)
         near = [(places[at][0], float(distance), pair) for distance, at, pair in zip(*found, strict=True)]
         worst = max(self._taken(poses.cut, point), self._lacking(near, spare, _INEXACT), key=lambda each: each[0])
-        return self._jamming(poses.cut) if worst[1] is None else worst
+        return self._jamming(poses.cut, point) if worst[1] is None else worst
 
     def tool_room(self, poses: CutPoses, axes: Sequence[Line]) -> float:
         """Least distance of the tool from some canes on its way into a cut (m); infinite from the cane that is cut."""
@@ -744,15 +754,16 @@ class CutClearance:
         """Least distance of the tool, with open blades, from standing canes on its way into a cut (m).
 
         Canes that will be cut off count too, but for the one that is cut, or those that fall with a stub; so do canes
-        that the blades may push aside, and the cane that stays on a stub: so near to its base it hardly bends. A cane
-        between the blades has none.
+        that the blades may push aside, and the cane that stays on a stub: so near to its base it hardly bends. Beside
+        last year's cane all of them count. A cane between the blades has none.
         """
         cut = poses.cut.translation
-        near = self._surroundings.canes_near(cut, _AROUND) if point.kind == "renewal cut" else ()
+        old_wood = point.kind in ("renewal cut", "removal")
+        near = self._surroundings.canes_near(cut, _AROUND) if old_wood else ()
         staying = Axes(tuple(obstacle for capsule, obstacle in near if not _is_cut(capsule, point)))
         room = float(self._surroundings.model.tool_gaps((*poses.between, poses.cut), staying).min(initial=math.inf))
         gaps = self._axes.gaps(cut[None], np.zeros(1))[0]
-        own = set(self._line_of[gaps < _OWN].tolist())
+        own = set[int]() if point.kind == "removal" else set(self._line_of[gaps < _OWN].tolist())
         if own and point.kind != "renewal cut":
             own = {int(self._line_of[int(np.argmin(gaps))])}
         others = np.flatnonzero((gaps < _AROUND) & ~np.isin(self._line_of, list(own)))
@@ -783,11 +794,12 @@ class CutClearance:
     def bitten(self, T_map_tool: Any, point: PruningPoint) -> Reason | None:
         """What the closing blades would bite on at a pose besides the cut; None where there is nothing.
 
-        Canes that stay, and wires, posts, trunks and cordons: open blades may pass on either side of them.
+        Canes that stay, and wires, posts, trunks and cordons but for the piece that is removed: open blades may pass on
+        either side of them.
         """
         if not self._settings.collisions:
             return None
-        return self._taken(T_map_tool, point)[1] or self._jamming(T_map_tool)[1]
+        return self._taken(T_map_tool, point)[1] or self._jamming(T_map_tool, point)[1]
 
     def _taken(self, T_map_tool: Any, point: PruningPoint) -> tuple[float, Reason | None]:
         """A cane that the blades would cut as well at a pose: how far it is in (m), and the reason."""
@@ -806,10 +818,10 @@ class CutClearance:
                 worst, found = inside, near
         return worst, found
 
-    def _jamming(self, T_map_tool: Any) -> tuple[float, Reason | None]:
+    def _jamming(self, T_map_tool: Any, point: PruningPoint) -> tuple[float, Reason | None]:
         """A hard part that the blades would close on at a pose: how much of a distance it lacks (m), and the reason."""
         worst, found = 0.0, None
-        for rigid in self._surroundings.rigid_near(T_map_tool.translation, _BESIDE):
+        for rigid in self._surroundings.rigid_near(WorkPlace.of(T_map_tool.translation, point), _BESIDE):
             gap = _gap_between_blades(rigid, T_map_tool)
             if _LEAST_ROOM - gap > worst:
                 worst = _LEAST_ROOM - gap
@@ -818,8 +830,11 @@ class CutClearance:
 
 
 def _is_cut(cane: Capsule, point: PruningPoint) -> bool:
-    """Whether a cane is the one that is cut at a point; of a cut on a stub, one that goes with the stub."""
-    if (cane.vine, cane.spur) != (point.vine, point.spur):
+    """Whether a cane is the one that is cut at a point; of a cut on a stub, one that goes with the stub.
+
+    A removal cuts none of the spur beside last year's cane.
+    """
+    if (cane.vine, cane.spur) != (point.vine, point.spur) or point.kind == "removal":
         return False
     known = cane.cane >= 0 and point.cane >= 0
     if point.kind == "renewal cut":

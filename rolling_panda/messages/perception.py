@@ -39,7 +39,7 @@ class PruningPoint(Struct, frozen=True, forbid_unknown_fields=True):
         point_id: Stable while the point is tracked from frame to frame.
         revision: Increases when the cut changes: its kind, the nodes kept, or its place or tangent by more than noise.
         position: Position on the cane's axis, in map (m).
-        tangent: Unit vector along the cane in map, pointing away from the cordon.
+        tangent: Unit vector along the cane in map, pointing away from the cordon; of a removal away from the head.
         radius: Radius of the cane (m).
         confidence: 0 … 1.
         nodes_seen: Number of count nodes seen on the cane, without the basal bud.
@@ -47,10 +47,11 @@ class PruningPoint(Struct, frozen=True, forbid_unknown_fields=True):
         vine: Number of the vine along the row, as perceived.
         spur: Number of the spur position on that vine, as perceived.
         cane: Number of the cane on that spur, as perceived; of a renewal cut that of the cane that stays. It names the
-            same cane for as long as perception runs; -1 if unknown.
+            same cane for as long as perception runs; -1 if unknown, and of a removal.
         reason: Explanation of the cut for a grower.
         kind: `spur cut` shortens the cane that stays, `renewal cut` removes the old stub, `cane cut` shortens the
-            fruiting cane, `by hand` was placed by a person.
+            fruiting cane, `removal` takes last year's cane of a Guyot vine off its head, with all that grows on it,
+            `by hand` was placed by a person. A removal has the spur beside that cane, and no nodes.
         position_covariance: Covariance of the position (m²): xx, xy, xz, yy, yz, zz.
         tangent_covariance: Covariance of the tangent in the same order.
         offset: Distance past the last kept node along the cane (m); None without a kept node below the cut.
@@ -319,6 +320,9 @@ Number = Annotated[int, Meta(ge=-1, le=10**6)]
 class Capsule(Struct, frozen=True, forbid_unknown_fields=True):
     """A capsule, in the frame of its message.
 
+    A cordon with the number of a spur is last year's cane of a Guyot vine: a rigid obstacle as any cordon is, but the
+    blades may close on it in a removal.
+
     Attributes:
         kind: Class of the wood or object.
         start: First end of the axis (m).
@@ -326,7 +330,7 @@ class Capsule(Struct, frozen=True, forbid_unknown_fields=True):
         start_radius: Radius at `start` (m).
         end_radius: Radius at `end` (m).
         vine: Number of the vine, as in pruning points; -1 for none.
-        spur: Number of the spur that it grows from; -1 for none.
+        spur: Number of the spur that it grows from, or of last year's cane that of the spur beside it; -1 for none.
         undecided: True for canes of an undecided site, which may be cut later, and for the hidden rest of any cane.
         cane: Number of the cane on that spur, as in pruning points; -1 if unknown.
     """
@@ -487,7 +491,7 @@ class Obstacles(Message, frozen=True, kw_only=True):
     Attributes:
         header: `frame_id` is map.
         capsules: Posts, trunks, cordons, wires and retained canes. Wood that will be cut off is not an obstacle: it
-            gives way.
+            gives way. Last year's cane of a Guyot vine is too stiff for that: it is one, a cordon with a spur.
     """
 
     header: Header

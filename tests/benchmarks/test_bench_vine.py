@@ -170,12 +170,9 @@ def asked_for(count):
 
 def bite(each, past=0.0):
     where = each.cut.best + past * each.cut.tangent
-    # As the trace has it: wood that is no cane has no cane's number, and last year's cane has no spur's either.
-    kind, spur, cane = {
-        STUB: ("spur", each.spur, -1),
-        OLD_CANE: ("cordon", -1, -1),
-    }.get(each.cane, ("cane", each.spur, each.cane))
-    piece = {"vine": each.vine, "spur": spur, "cane": cane, "kind": kind, "point": where.tolist()}
+    # As the trace has it: wood that is no cane has no cane's number.
+    kind, cane = {STUB: ("spur", -1), OLD_CANE: ("cordon", -1)}.get(each.cane, ("cane", each.cane))
+    piece = {"vine": each.vine, "spur": each.spur, "cane": cane, "kind": kind, "point": where.tolist()}
     return {"event": "cut", "point_id": f"p{each.spur}", "code": "wood_severed", "severed": [piece]}
 
 

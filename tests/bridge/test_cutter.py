@@ -76,6 +76,26 @@ def test_wire_post_and_thick_wood_jam_the_blades_and_nothing_is_severed(hard: Ro
     assert result.applied(row) is row
 
 
+@pytest.mark.parametrize("spur", [0, -1])
+def test_last_years_cane_of_a_guyot_vine_is_severed_and_a_permanent_cordon_jams(spur: int) -> None:
+    """They have the same class; last year's cane has the number of the spur beside it."""
+    old = Rod("cordon", np.array([0, 0, 0.9]), np.array([0, 0, 1.06]), 0.007, 0.0065, -1, 1, spur)
+    beyond = Rod("cordon", old.end, np.array([0.1, 0, 1.06]), 0.0065, 0.006, 0, 1, spur)
+    row = Row((old, beyond))
+    result = close_blades(row, TOOL, CONFIG)
+    assert result.jammed == (spur < 0)
+    assert [item.index for item in result.severed] == ([] if spur < 0 else [0])
+    left = result.applied(row).rods
+    assert (left[1] is None) == (spur >= 0) and left[0] is not None
+    assert left[0].end[2] == pytest.approx(1.06 if spur < 0 else 1.0)
+
+
+def test_too_thick_a_cane_of_last_year_jams() -> None:
+    old = Rod("cordon", np.array([0, 0, 0.9]), np.array([0, 0, 1.1]), 0.013, 0.013, -1, 1, 0)
+    result = close_blades(Row((old,)), TOOL, CONFIG)
+    assert result.jammed and result.detail == reasons.wood_beyond_blades("cordon", 26.0)
+
+
 def test_a_wire_beside_the_blade_plane_does_not_jam() -> None:
     assert not close_blades(Row((upright(), along_row("wire", 1.01, 0.00125))), TOOL, CONFIG).jammed
 

@@ -52,3 +52,26 @@ def test_gravity_of_the_arm_and_the_frames_are_pinocchios(robot: RobotModel, see
 def test_posts_are_solid_and_canes_are_not() -> None:
     plant = build_plant(Row((POST, CANE)))
     assert int(plant.solid.sum()) == 1
+
+
+@pytest.mark.parametrize("hangs", [None, np.array([0.02, 0.0, -0.03])])
+def test_of_last_years_cane_only_what_is_left_of_it_is_met(hangs: np.ndarray | None) -> None:
+    """Its two pieces are where the robot stands: each is met as long as it is there, and a permanent cordon always."""
+    low, top = np.array([0.0, 0.0, 0.1]), np.array([0.0, 0.0, 0.2])
+    pieces = [Rod("cordon", low, top, 0.007, 0.007, -1, 0, spur) for spur in (0, -1)]
+    beyond = Rod("cordon", top, low + [0.05, 0.0, 0.0], 0.007, 0.007, 0, 0, 0)
+    uncut = Row((pieces[0], beyond, pieces[1], POST))
+    plant = build_plant(uncut)
+    data = mujoco.MjData(plant.model)
+
+    def met(row: Row) -> set[str]:
+        plant.remove_severed(row)
+        mujoco.mj_forward(plant.model, data)
+        names = {plant.model.geom(int(geom)).name for pair in data.contact.geom for geom in pair}
+        return {name for name in names if name.startswith("row_")}
+
+    assert met(uncut) == {"row_cordon_0", "row_cordon_1", "row_cordon_2"}
+    # What grows beyond the cut is gone at once, and a piece ends at the cut.
+    assert met(uncut.sever(0, 0.4, hangs)) == {"row_cordon_0", "row_cordon_2"}
+    geom = plant.model.geom("row_cordon_0")
+    assert geom.pos[2] == pytest.approx(0.12) and geom.size[1] == pytest.approx(0.02)

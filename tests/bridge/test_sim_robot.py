@@ -241,3 +241,22 @@ def test_a_joint_that_holds_follows_a_step_nearly_as_one_that_does_not() -> None
         speed = speed + servos.step(np.ones(1), speed, np.eye(1)) * 0.001
         trail.append(float(speed[0]))
     assert max(trail) < 1.06 and abs(trail[-1] - 1.0) < 0.005
+
+
+@pytest.mark.parametrize(("spur", "outcome"), [(0, "DONE"), (-1, "FAILED_NOT_CUT")])
+def test_what_last_years_cane_carries_is_met_no_more_once_it_is_severed(spur: int, outcome: str) -> None:
+    tool = robot().true_tool()
+    at, across = tool[:3, 3], tool[:3, 1]
+    bow = Rod("cordon", at - 0.03 * across, at + 0.03 * across, 0.007, 0.007, -1, 0, spur)
+    beyond = Rod("cordon", np.array([0.4, 0.1, 0.0]), np.array([0.4, 0.1, 0.5]), 0.007, 0.007, 0, 0, spur)
+    sim = robot(Row((bow, beyond)))
+    sim.cut("c1", "p1")
+    for _ in range(700):
+        sim.write(setpoint())
+    assert sim.read().outcome == outcome
+    touched = 0
+    for _ in range(1500):
+        sim.write(setpoint(0.3))
+        touched += sim.contacts
+    assert (touched > 0) == (spur < 0)
+    assert (sim.true_base().pose[0] < 0.25) == (spur < 0)

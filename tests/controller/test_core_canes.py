@@ -41,14 +41,14 @@ class Judge:
     def look(self, q):
         near = self._model.distances(q, 0.1)
         for (part, name), distance in zip(near.pairs, near.distance.tolist(), strict=True):
-            if name.startswith("cane"):
+            if name.startswith(("cane", "cordon")):
                 key = ("blades" if part == BLADES else "rest", int(name.split()[1].rstrip(",")))
                 self.least[key] = min(self.least.get(key, 1.0), distance)
 
 
-def work(*canes, limit_s=25.0):
+def work(*canes, limit_s=25.0, **changes):
     """Makes the cut among canes; what happened, and how near everything came."""
-    r, judge = working((point("a", CUT),), obstacles=canes), Judge(*canes)
+    r, judge = working((point("a", CUT, **changes),), obstacles=canes), Judge(*canes)
     run_until(r, lambda s: s is not None and s.mode == "AUTO", 2.0)
     while r.state.mode == "AUTO":
         r.step()
@@ -64,6 +64,37 @@ def test_the_blades_go_to_the_spur_that_is_cut_and_nothing_else_goes_near_any():
     assert judge.least["blades", 0] < 0.015, "the blades have their work there"
     assert judge.least["rest", 0] > 0.008
     assert all(distance > 0.004 for (_, number), distance in judge.least.items() if number > 0)
+
+
+def cordon(start, end, spur=1):
+    """A piece of cordon; with a spur it is last year's cane of a Guyot vine."""
+    return Capsule("cordon", start, end, 0.007, 0.007, 0, spur)
+
+
+#: Last year's cane, which rises from the head and lies along the row.
+RISES = (0.8, 0.0, 0.6)
+HEAD, BENT = (CUT[0] - 0.048, CUT[1], CUT[2] - 0.036), (CUT[0] + 0.08, CUT[1], CUT[2] + 0.06)
+LIES = cordon(BENT, (BENT[0] + 0.4, CUT[1], BENT[2]))
+
+
+def test_the_guard_lets_the_blades_close_on_last_years_cane_and_keeps_all_else_off_it():
+    """It is seen 5 mm nearer to one of the blades than the point has it: with its distance they would not get there."""
+    aside = (-0.003, 0.0, 0.004)
+    start, end = (tuple(np.add(each, aside).tolist()) for each in (HEAD, BENT))
+    r, judge = work(cordon(start, end), LIES, spur=1, kind="removal", tangent=RISES, cane=-1, radius=0.007)
+    assert entry(r, "a").state == "DONE", entry(r, "a").reason
+    np.testing.assert_allclose(r.cuts[0][1][:3, 3], CUT, atol=0.002)
+    kept = ControllerConfig().whole_body.hierarchy
+    assert 0.0 < judge.least["blades", 0] < kept.blade_distance
+    assert judge.least["rest", 0] > kept.cutter_distance - 0.001
+    assert min(judge.least[part, 1] for part in ("blades", "rest") if (part, 1) in judge.least) > kept.blade_distance
+
+
+@pytest.mark.parametrize(("spur", "kind"), [(-1, "removal"), (1, "by hand")])
+def test_a_permanent_cordon_is_not_cut_nor_last_years_cane_by_another_cut(spur, kind):
+    r, _ = work(cordon(HEAD, BENT, spur), spur=1, kind=kind, tangent=RISES, cane=-1, radius=0.007)
+    assert entry(r, "a").state == "FAILED_NOT_CUT" and not r.cuts
+    assert "no_clear_posture" in str(entry(r, "a").reason) and "cordon 0" in str(entry(r, "a").reason)
 
 
 @pytest.mark.long

@@ -430,10 +430,106 @@ def test_clear_of_the_canes_there_is_room_for_the_motion_to_lead_on():
     beside = Capsule("wire", (x + 0.047, y, z - 0.03), (x + 0.047, y, z + 0.03), 0.002, 0.002)
     clearance = CutClearance(RobotModel(), CONFIG.whole_body.hierarchy)
     clearance.update(Received(Obstacles(header=m.Header(0.0, "odom"), capsules=(beside,)), 0.0))
+    cut = point("p1", tuple(POINT.tolist()), vine=1, spur=1)
     near, far = free.q_clear.copy(), free.q_clear.copy()
     far[0] += 1.0
-    assert clearance.too_near(replace(free, q_clear=far, q_stand_off=far, q_cut=near)) == (0.0, None)
-    lacking, why = clearance.too_near(replace(free, q_clear=near, q_stand_off=far, q_cut=far))
+    assert clearance.too_near(replace(free, q_clear=far, q_stand_off=far, q_cut=near), cut) == (0.0, None)
+    lacking, why = clearance.too_near(replace(free, q_clear=near, q_stand_off=far, q_cut=far), cut)
     assert lacking == pytest.approx(0.003, abs=0.001)
     assert why.code == "too_near" and dict(why.values)["place"] == "clear of it"
     assert dict(why.values)["distance_mm"] == pytest.approx(17.0, abs=0.5) and dict(why.values)["needed_mm"] == 20.0
+
+
+#: Of last year's cane where it rises from the head.
+BOW = np.array([0.8, 0.0, 0.6])
+
+
+def old_cane(start, end, vine=1, spur=1, radius=0.007):
+    """A piece of last year's cane from one distance along it to another, past the point (m)."""
+    ends = (tuple((POINT + along * BOW).tolist()) for along in (start, end))
+    return Capsule("cordon", *ends, radius, radius, vine, spur)
+
+
+def lying():
+    """The piece after the bow, along the row."""
+    corner = POINT + 0.1 * BOW
+    return Capsule("cordon", tuple(corner.tolist()), tuple((corner + [0.3, 0.0, 0.0]).tolist()), 0.0065, 0.006, 1, 1)
+
+
+def removal(*capsules, kind="removal", **changes):
+    return find(*capsules, tangent=tuple(BOW.tolist()), kind=kind, cane=-1, **changes)
+
+
+def test_last_years_cane_is_taken_off_where_it_rises_from_the_head():
+    plan = removal(old_cane(-0.06, 0.1), lying())
+    assert isinstance(plan, CutPlan)
+    np.testing.assert_allclose(plan.poses.cut.translation, POINT)
+    # The blades have it between them; the rest of the robot and the piece beyond keep their distances.
+    across = plan.poses.cut.rotation.T @ BOW
+    assert abs(across[1]) > np.cos(0.85)
+    assert nearest(plan, old_cane(-0.06, 0.1)) > SETTINGS.cutter_distance
+    assert min(nearest(plan, lying(), part) for part in ("blades", "cutter")) > SETTINGS.blade_distance
+
+
+@pytest.mark.parametrize("kind", ["spur cut", "renewal cut", "cane cut", "by hand"])
+def test_no_other_cut_closes_on_last_years_cane_and_the_reason_names_it(kind):
+    plan = removal(old_cane(-0.06, 0.1), kind=kind)
+    assert isinstance(plan, Unreachable)
+    near = dict(dict(plan.reason.values)["near"].values)
+    assert near["part"] == "blades" and near["other"] == "cordon 0, vine 1, spur 1"
+
+
+@pytest.mark.parametrize(("vine", "spur", "name"), [(1, -1, "cordon 0"), (2, 1, "cordon 0, vine 2, spur 1")])
+def test_a_removal_closes_on_no_permanent_cordon_and_on_no_other_vines_cane(vine, spur, name):
+    plan = removal(old_cane(-0.06, 0.1, vine, spur))
+    assert isinstance(plan, Unreachable)
+    near = dict(dict(plan.reason.values)["near"].values)
+    assert near["part"] == "blades" and near["other"] == name
+
+
+def test_a_removal_keeps_clear_of_the_pieces_that_it_does_not_cut_through():
+    """What bends back to the cut is of the same cane, and still in the way: the blades would bite on it."""
+    start = POINT + 0.017 * np.array([0.0, 1.0, 0.0])
+    back = Capsule("cordon", tuple(start.tolist()), tuple((start + 0.2 * BOW).tolist()), 0.007, 0.007, 1, 1)
+    assert isinstance(removal(old_cane(-0.06, 0.1)), CutPlan)
+    plan = removal(old_cane(-0.06, 0.1), back)
+    assert isinstance(plan, Unreachable)
+    assert "cordon 1" in str(plan.reason)
+
+
+@pytest.mark.parametrize("number", [-1, 0, 1])
+def test_a_removal_takes_no_cane_of_the_spur_beside_last_years_cane(number):
+    plan = removal(old_cane(-0.06, 0.1), beside(0.0, 0.017, 1, number))
+    assert not isinstance(plan, CutPlan) or not bitten(plan, beside(0.0, 0.017, 1, number))
+
+
+def test_open_blades_that_remove_last_years_cane_push_no_shoot_of_it():
+    """The shoot falls with it, but it stands while the blades come in."""
+    foot = POINT + 0.024 * np.array([-0.6, 0.0, 0.8])
+    shoot = (tuple(foot.tolist()), tuple((foot + [0.0, 0.0, 0.3]).tolist()))
+    free, plan = removal(old_cane(-0.06, 0.1)), removal(old_cane(-0.06, 0.1), standing=(shoot,))
+    assert isinstance(free, CutPlan) and isinstance(plan, CutPlan)
+    assert way_room(free, shoot) < 0.003 <= way_room(plan, shoot)
+
+
+def test_a_shoot_between_the_blades_leaves_no_room_for_a_removal_however_near_to_the_cut_it_grows():
+    foot = POINT + 0.013 * np.array([-0.6, 0.0, 0.8])
+    shoot = (tuple(foot.tolist()), tuple((foot + [0.0, 0.0, 0.3]).tolist()))
+    cut = point("p1", tuple(POINT.tolist()), tuple(BOW.tolist()), vine=1, spur=1, cane=-1, kind="removal")
+    clearance = CutClearance(RobotModel(), SETTINGS)
+    nothing = Received(Obstacles(header=m.Header(0.0, "odom"), capsules=()), 0.0)
+    clearance.update(nothing, (shoot,))
+    square = cut_poses(POINT, BOW, np.array([0.0, 1.0, 0.0]), 0.1, 0.2)
+    assert clearance.beside(square, cut) < 0.0
+
+
+def test_where_a_close_up_sees_last_years_cane_it_is_removed_there():
+    seen = POINT + [0.004, 0.003, -0.002]
+    cut = point("p1", tuple(POINT.tolist()), tuple(BOW.tolist()), vine=1, spur=1, cane=-1, kind="removal")
+    search = among((old_cane(-0.06, 0.1), lying()))
+    plan = find(old_cane(-0.06, 0.1), lying(), tangent=tuple(BOW.tolist()), kind="removal", cane=-1)
+    fitted = completed(search.fit(plan, cut, seen))
+    assert fitted.plan is not None and fitted.lacking is None
+    np.testing.assert_allclose(fitted.plan.poses.cut.translation, seen, atol=1e-9)
+    other = point("p1", tuple(POINT.tolist()), tuple(BOW.tolist()), vine=1, spur=1, cane=-1, kind="by hand")
+    assert completed(search.fit(plan, other, seen)).plan is None

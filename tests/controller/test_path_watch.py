@@ -3,6 +3,7 @@
 import time
 from dataclasses import replace
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
@@ -86,6 +87,18 @@ def test_the_spur_that_is_cut_may_be_touched_by_the_blades_and_its_neighbour_may
     assert watch().changed([KNOWN, stays]) is None
     post = Capsule("post", stays.start, stays.end, 0.004, 0.004)
     assert watch().changed([KNOWN, post]).code in FOUND
+
+
+def test_last_years_cane_may_be_touched_by_the_blades_in_its_removal_and_in_no_other_cut():
+    at = np.array(A.position)
+    low, high = at - (0.0, 0.0, 0.06), at + (0.0, 0.0, 0.04)
+    piece = Capsule("cordon", tuple(low.tolist()), tuple(high.tolist()), 0.007, 0.007, vine=0, spur=0)
+    removal = msgspec.structs.replace(A, kind="removal", cane=-1)
+    made = replace(MADE, request=replace(MADE.request, points=(removal, B)))
+    assert watch(made).changed([KNOWN, piece]) is None
+    for other in (msgspec.structs.replace(piece, spur=-1), msgspec.structs.replace(piece, vine=1)):
+        assert watch(made).changed([KNOWN, other]).code in FOUND
+    assert watch().changed([KNOWN, piece]).code in FOUND
 
 
 def test_what_stands_where_the_work_has_been_is_no_matter():

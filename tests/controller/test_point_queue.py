@@ -1,4 +1,5 @@
 import msgspec
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -125,8 +126,9 @@ def test_a_thick_cane_is_refused():
     assert q.accept("a", 3, "ada") == reasons.cane_too_thick("a", 18.0, 15.0)
 
 
-def test_a_stub_of_two_year_wood_may_be_thicker():
-    q = queue(*(point(name, radius=radius, kind="renewal cut") for name, radius in (("a", 0.009), ("b", 0.011))))
+@pytest.mark.parametrize("kind", ["renewal cut", "removal"])
+def test_two_year_wood_may_be_thicker(kind):
+    q = queue(*(point(name, radius=radius, kind=kind) for name, radius in (("a", 0.009), ("b", 0.011))))
     assert q.accept("a", 3, "ada") is None
     assert q.accept("b", 3, "ada") == reasons.cane_too_thick("b", 22.0, 20.0)
 

@@ -100,9 +100,9 @@ class Cutter:
 def close_blades(row: Row, T_world_tool: Array, config: BridgeConfig) -> CutResult:
     """Close the blades on the row.
 
-    A cane, spur or node is severed where its axis crosses the blade plane (through the tool's origin, normal to its y)
-    between the blades. Any part of a wire, post, trunk or cordon, or too thick wood, between the blades jams them, and
-    nothing is severed.
+    A cane, spur or node, or last year's cane of a Guyot vine, is severed where its axis crosses the blade plane
+    (through the tool's origin, normal to its y) between the blades. Any part of a wire, post, trunk or permanent
+    cordon, or too thick wood, between the blades jams them, and nothing is severed.
 
     Args:
         row: The row.
@@ -119,7 +119,7 @@ def close_blades(row: Row, T_world_tool: Array, config: BridgeConfig) -> CutResu
     at = starts + np.nan_to_num(fraction)[:, None] * (ends - starts)
     crosses = ~np.isnan(fraction) & _between(at, config)
     for _, rod in standing:
-        if rod.kind not in _SOFT and _reaches(rod, T_world_tool, config):
+        if not _soft(rod) and _reaches(rod, T_world_tool, config):
             return CutResult((), True, reasons.blades_on_hard_part(rod.kind))
 
     cuts: list[tuple[int, Rod, float]] = []
@@ -140,7 +140,7 @@ def wood_in_plane(row: Row, T_world_tool: Array) -> Array:
 
     Lateral shoots do not count.
     """
-    soft = [rod for _, rod in row.standing() if rod.kind in _SOFT and rod.organ < 0]
+    soft = [rod for _, rod in row.standing() if _soft(rod) and rod.organ < 0]
     if not soft:
         return np.zeros((0, 2))
     R, p = T_world_tool[:3, :3], T_world_tool[:3, 3]
@@ -149,6 +149,11 @@ def wood_in_plane(row: Row, T_world_tool: Array) -> Array:
     at = (starts + np.nan_to_num(fraction)[:, None] * (ends - starts))[~np.isnan(fraction)][:, [0, 2]]
     nearest_first: Array = at[np.argsort(np.linalg.norm(at, axis=1), kind="stable")]
     return nearest_first
+
+
+def _soft(rod: Rod) -> bool:
+    """Whether the blades sever it."""
+    return rod.kind in _SOFT or rod.last_years
 
 
 def _plane_crossing(starts: Array, ends: Array) -> Array:

@@ -6,7 +6,8 @@ Physics assumptions:
   and gives way a little.
 - The caster's fork and wheel are bodies of their own.
 - The base has a free joint; only friction holds it.
-- Posts, trunks, cordons and wires are rigid. Canes and spurs are visible and can be cut, but do not collide.
+- Posts, trunks, cordons and wires are rigid, and so is last year's cane of a Guyot vine until it is severed. Canes and
+  spurs are visible and can be cut, but do not collide.
 - Arm, tool and base collide with each other, the floor and the row, except for the pairs that the Panda's description
   excludes.
 """
@@ -20,7 +21,7 @@ import numpy as np
 import pinocchio as pin
 
 from bridge.sim.robot.inertial import ACCELEROMETER
-from bridge.sim.vineyard.row import Row
+from bridge.sim.vineyard.row import Rod, Row
 from bridge.sim.world.errors import Errors
 from rolling_panda.errors import ModelError
 from rolling_panda.model.differential_drive import Array
@@ -66,6 +67,7 @@ class Plant:
         solid: Whether a geom is a post, trunk, cordon or wire (ngeom).
         rolling: Whether a geom is a tyre or the floor (ngeom).
         ground: Planes under the wheels on uneven ground, each with the body of its wheel; empty on a flat floor.
+        severable: Geoms of last year's canes, each with the index of its rod.
     """
 
     model: Any
@@ -79,6 +81,22 @@ class Plant:
     solid: Any
     rolling: Any
     ground: tuple[tuple[int, int], ...] = ()
+    severable: tuple[tuple[int, int], ...] = ()
+
+    def remove_severed(self, row: Row) -> None:
+        """Let the robot meet no more of last year's canes than stands in a row that was cut.
+
+        What hangs in the wires gives way like other severed wood.
+        """
+        model = self.model
+        for geom, index in self.severable:
+            rod = row.rods[index]
+            if rod is None or rod.hanging:
+                model.geom_conaffinity[geom] = 0
+                continue
+            half = float(np.linalg.norm(rod.end - rod.start)) / 2
+            model.geom_pos[geom], model.geom_size[geom, 1] = (rod.start + rod.end) / 2, half
+            model.geom_rbound[geom] = half + model.geom_size[geom, 0]
 
 
 def build_plant(row: Row, errors: Errors | None = None, uneven: bool = False, inertial: bool = False) -> Plant:
@@ -127,7 +145,7 @@ def build_plant(row: Row, errors: Errors | None = None, uneven: bool = False, in
         model = spec.compile()
     except ValueError as error:
         raise ModelError(f"MuJoCo refuses the robot: {error}") from error
-    return _plant(model)
+    return _plant(model, row)
 
 
 def _misplace(robot: Any, errors: Errors) -> None:
@@ -154,7 +172,7 @@ def _add_ground(spec: Any) -> None:
         plane.solref, plane.solimp, plane.priority = list(_SOIL_SOLREF), list(_SOIL_SOLIMP), 1
 
 
-def _plant(model: Any) -> Plant:
+def _plant(model: Any, row: Row) -> Plant:
     def joint(name: str) -> int:
         return int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name))
 
@@ -176,6 +194,7 @@ def _plant(model: Any) -> Plant:
             for tyre in _TYRES
             if f"under_{tyre}" in names
         ),
+        tuple((names.index(_geom_name(index, rod)), index) for index, rod in row.standing() if rod.last_years),
     )
 
 
@@ -204,12 +223,16 @@ def _add_row(spec: Any, row: Row) -> None:
         if rod.kind not in SOLID:
             continue
         geom = spec.worldbody.add_geom(
-            name=f"row_{rod.kind}_{index}",
+            name=_geom_name(index, rod),
             type=mujoco.mjtGeom.mjGEOM_CAPSULE,
             fromto=[*rod.start, *rod.end],
             size=[max(rod.start_radius, rod.end_radius), 0.0, 0.0],
         )
         geom.contype, geom.conaffinity = 0, _HITS_ROW
+
+
+def _geom_name(index: int, rod: Rod) -> str:
+    return f"row_{rod.kind}_{index}"
 
 
 def _add_base(spec: Any, robot: Any) -> Any:

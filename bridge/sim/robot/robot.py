@@ -416,6 +416,7 @@ class SimulatedRobot:
         result = self._bite(tool)
         if result.severed:
             self.row = result.applied(self.row, self._wood.hangs(), self._wood.lies())
+            self._plant.remove_severed(self.row)
         # Blades that met say so, also when the wood hangs by its bark.
         done = bool(result.severed) or result.detail == reasons.blades_met()
         self._cutter.finish("DONE" if done else "FAILED_NOT_CUT", result.detail, result.jammed)

@@ -134,7 +134,7 @@ def _truth(vineyard: Vineyard) -> list[_Right]:
         for vine in judge_guyot(vineyard.row):
             out += _right(vine.vine, 0, vine.lower, "spur cut", vine.spur_cut)
             out += _right(vine.vine, 0, vine.upper, "cane cut", vine.cane_cut)
-            out += _right(vine.vine, -1, -1, "removal", vine.removal)
+            out += _right(vine.vine, 0, -1, "removal", vine.removal)
         return out
     for spur in judge(vineyard.row):
         out += _right(spur.vine, spur.spur, spur.keeper, "spur cut", spur.cut)

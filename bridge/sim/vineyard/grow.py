@@ -2,7 +2,8 @@
 
 The row runs along +x. A cordon-trained vine has two permanent arms at the fruiting wire, spurs of two-year wood on the
 arms, and one-year canes that grow upright from the spurs through the wires. A Guyot vine has one cane of last year laid
-along the fruiting wire, with a shoot from each node, and a spur beside it. That cane is labelled as cordon.
+along the fruiting wire, with a shoot from each node, and a spur beside it. That cane is labelled as cordon, and has the
+spur's number.
 """
 
 import numpy as np
@@ -143,13 +144,13 @@ def _guyot_vine(growth: RowBuilder, rng: np.random.Generator, vine: int, trunk: 
     longest = config.vine_spacing - _GUYOT_BEND - 0.12
     scale = min(1.0, longest / max(sum(steps), 1e-9))
     radii = np.linspace(config.guyot_radius[1], config.guyot_radius[0], config.guyot_nodes + 1)
-    parent = growth.add(Rod("cordon", head, level, radii[0], radii[1], trunk, vine))
+    parent = growth.add(Rod("cordon", head, level, radii[0], radii[1], trunk, vine, 0))
     here = level
     for node in range(config.guyot_nodes):
         _guyot_shoot(growth, rng, parent, here, vine, node + 1)
         if node < config.guyot_nodes - 1:
             following = here + [side * scale * steps[node], rng.normal(0.0, 0.003), rng.normal(0.0, 0.003)]
-            parent = growth.add(Rod("cordon", here, following, radii[node + 1], radii[node + 2], parent, vine))
+            parent = growth.add(Rod("cordon", here, following, radii[node + 1], radii[node + 2], parent, vine, 0))
             here = following
 
 

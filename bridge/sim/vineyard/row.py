@@ -26,7 +26,7 @@ class Rod:
         end_radius: Radius at `end` (m).
         parent: Index of the rod that carries it; -1 for none.
         vine: Vine along the row, -1 for posts, wires and ground.
-        spur: Spur on the vine, -1 for none.
+        spur: Spur on the vine, -1 for none; of last year's cane of a Guyot vine the spur beside it.
         cane: Cane on the spur, -1 for none.
         hanging: Severed, and held by the wires.
         organ: Number of a lateral shoot, tendril or old leaf on the cane; -1 for the cane itself.
@@ -43,6 +43,11 @@ class Rod:
     cane: int = -1
     hanging: bool = False
     organ: int = -1
+
+    @property
+    def last_years(self) -> bool:
+        """Whether it is a piece of last year's cane of a Guyot vine, which is labelled as cordon."""
+        return self.kind == "cordon" and self.spur >= 0
 
     def at(self, fraction: float) -> tuple[Array, float]:
         """Point on the axis (3, m) and radius (m) at a fraction 0…1 of the length."""

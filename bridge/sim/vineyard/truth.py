@@ -224,7 +224,7 @@ def judge_guyot(row: Row) -> tuple[GuyotTruth, ...]:
     for index, rod in row.standing():
         if rod.cane >= 0 and rod.spur == 0:
             chains.setdefault(rod.vine, {}).setdefault(rod.cane, []).append((index, rod))
-        elif rod.kind == "cordon":
+        elif rod.last_years:
             arms.setdefault(rod.vine, (index, rod))
     out = []
     for vine in sorted(chains):

@@ -117,7 +117,7 @@ export interface PruningPoint {
   revision: number;
   /** Position on the cane's axis, in map (m). */
   position: Vector3;
-  /** Unit vector along the cane in map, pointing away from the cordon. */
+  /** Unit vector along the cane in map, pointing away from the cordon; of a removal away from the head. */
   tangent: UnitVector3;
   /** Radius of the cane (m). */
   radius: number;
@@ -133,7 +133,7 @@ export interface PruningPoint {
   spur: number;
   /** Explanation of the cut for a grower. */
   reason: Reason;
-  /** `spur cut` shortens the cane that stays, `renewal cut` removes the old stub, `cane cut` shortens the fruiting cane, `by hand` was placed by a person. */
+  /** `spur cut` shortens the cane that stays, `renewal cut` removes the old stub, `cane cut` shortens the fruiting cane, `removal` takes last year's cane of a Guyot vine off its head, with all that grows on it, `by hand` was placed by a person. A removal has the spur beside that cane, and no nodes. */
   kind: CutKind;
   /** Covariance of the position (m²): xx, xy, xz, yy, yz, zz. */
   position_covariance: Covariance|null;
@@ -151,7 +151,7 @@ export interface PruningPoint {
   node_distance: number|null;
   /** Hash of the revision's place and kind, see `point_digest`. */
   digest: string;
-  /** Number of the cane on that spur, as perceived; of a renewal cut that of the cane that stays. It names the same cane for as long as perception runs; -1 if unknown. */
+  /** Number of the cane on that spur, as perceived; of a renewal cut that of the cane that stays. It names the same cane for as long as perception runs; -1 if unknown, and of a removal. */
   cane: number;
   /** By how much nearer to the cordon the same cut may be made, where it has no room (m): on the same wood, with the same nodes left. */
   inward: number;
