@@ -52,7 +52,7 @@ _BASE, _LEAST_SINE, _THICK = 0.025, 0.2, 0.015
 _AGAINST = {"nodes_side_by_side", "nodes_far_apart", "cane_below_keeper", "keeper_close"}
 #: Last year's cane is cut so far from its trunk, and farther out where there is no room, up to here (m). A stump of
 #: twice its diameter or more dries, and the head stays sound.
-_STUMP, _LONGEST_STUMP, _STUMP_STEP = 0.04, 0.10, 0.01
+_STUMP, _LONGEST_STUMP, _STUMP_STEP = 0.04, 0.12, 0.01
 #: By so much nearer to the trunk it may be cut (m).
 _SHORTER_STUMP = 0.01
 
@@ -214,7 +214,7 @@ def _remove(old: Cane | None, others: list[Array], config: RuleConfig, keep_out:
 
     def refused(arc: float) -> Reason | None:
         start, end = arc - _VISIBLE_HALF_WIDTH, arc + _VISIBLE_HALF_WIDTH
-        if end > old.length or any(span.overlaps(start, end) for span in old.hidden):
+        if not old.arc[0] <= start < end <= old.length or any(span.overlaps(start, end) for span in old.hidden):
             return reasons.cut_place_hidden()
         return _obstructed(old.at(arc), others, config, keep_out)
 
@@ -222,13 +222,13 @@ def _remove(old: Cane | None, others: list[Array], config: RuleConfig, keep_out:
     arc = next((place for place in places if refused(place) is None), None)
     if arc is None:
         return refused(_STUMP) or reasons.cut_place_hidden()
-    hidden = sum(max(0.0, min(span.end, arc) - span.start) for span in old.hidden) + old.base_gap
+    hidden = sum(max(0.0, min(span.end, _LONGEST_STUMP) - span.start) for span in old.hidden) + old.base_gap
     return Cut(
         kind="removal",
         position=old.at(arc),
         tangent=old.tangent(arc),
         radius=old.radius,
-        confidence=float(np.clip(1.0 - hidden / arc, 0.0, 1.0)),
+        confidence=float(np.clip(1.0 - hidden / _LONGEST_STUMP, 0.0, 1.0)),
         nodes_seen=0,
         nodes_kept=0,
         reason=reasons.old_cane_removed(1000 * arc),

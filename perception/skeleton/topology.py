@@ -29,8 +29,9 @@ _STUB_DEPTH, _STUB_ROUNDS, _STUB_ACROSS = 0.03, 2, 0.015
 _WIDTH = (5.0, 95.0)
 #: Stride of the cordon pixels, and number of pixels for a direction.
 _CORDON_STRIDE, _MIN_CORDON = 4, 50
-#: Last year's cane of a Guyot vine begins so near to its trunk, and ends at least so far from it (m).
-_AT_TRUNK, _FROM_TRUNK = 0.03, 0.06
+#: Last year's cane of a Guyot vine is seen from so near to its trunk on, and at least so far from it (m). Its straight
+#: continuation meets the trunk to within this (m).
+_AT_TRUNK, _FROM_TRUNK, _MEETS = 0.08, 0.11, 0.03
 
 
 def perceive_plant(view: View, labels: Labels, config: SkeletonConfig) -> Plant:
@@ -67,8 +68,10 @@ def trace_old_canes(view: View, labels: Labels, config: SkeletonConfig) -> list[
     tree, out = cKDTree(np.concatenate(trunks)), []
     for line in trace_canes(view, wood_of_cut(labels, "removal"), config):
         gaps, _ = tree.query([line.axis[0], line.axis[-1]])
-        if gaps.min() < _AT_TRUNK and gaps.max() > _FROM_TRUNK:
-            out.append(_cane(line, bool(gaps[1] < gaps[0]), float(gaps.min())))
+        cane = _cane(line, bool(gaps[1] < gaps[0]), float(gaps.min()))
+        off, _ = tree.query(cane.base - float(gaps.min()) * cane.tangent(float(cane.arc[0])))
+        if gaps.min() < _AT_TRUNK and gaps.max() > _FROM_TRUNK and off < _MEETS:
+            out.append(cane)
     return out
 
 

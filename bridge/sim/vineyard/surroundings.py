@@ -62,6 +62,9 @@ def add_ties(growth: RowBuilder, rng: np.random.Generator, first: int) -> None:
     """Append ties around arms; they have the class of the wire, which the blades must avoid too."""
     config = growth.config
     arms = [rod for rod in growth.rods[first:] if rod is not None and rod.kind == "cordon"]
+    if config.training == "guyot":
+        # The bow between head and wire is tied to nothing.
+        arms = arms[1:]
     for _ in range(int(rng.integers(config.ties_a_vine[0], config.ties_a_vine[1] + 1))):
         rod = arms[int(rng.integers(len(arms)))]
         point, thickness = rod.at(float(rng.uniform(0.2, 0.8)))
