@@ -63,18 +63,18 @@ def test_blades_slant_to_pass_a_cane_that_stays_beside_a_cut_between_nodes(searc
 GUYOT = grow(VineyardConfig(vines=1, training="guyot", rows_behind=0), 3601)
 
 
-def test_of_a_guyot_vine_both_canes_stay_and_last_years_cane_is_in_the_way_but_for_its_own_removal():
+def test_of_a_guyot_vine_both_canes_stay_and_last_years_cane_is_in_the_way_with_the_number_of_its_spur():
     removal = next(each for each in wanted_cuts(GUYOT, guyot=True) if each.kind == "removal")
     capsules = oracle.obstacles_of(GUYOT, guyot=True).capsules
     canes = {(each.spur, each.cane) for each in capsules if each.kind == "cane"}
     assert canes == {(each.spur, each.cane) for each in wanted_cuts(GUYOT, guyot=True) if each.cane >= 0 and each.cut}
     cordons = [each for each in capsules if each.kind == "cordon"]
     arm = [rod for _, rod in GUYOT.standing() if rod.kind == "cordon"]
-    assert len(cordons) == len(arm)
-    left = [each for each in oracle.obstacles_of(GUYOT, True, removal.cut.rod).capsules if each.kind == "cordon"]
-    assert left == [each for each in cordons if each.start != tuple(GUYOT.rods[removal.cut.rod].start)]
     point = oracle.point_of(GUYOT, removal, removal.cut, guyot=True)
-    assert (point.vine, point.spur) not in {(each.vine, each.spur) for each in capsules}, "the spur's canes stay"
+    assert len(cordons) == len(arm) and {(each.vine, each.spur) for each in cordons} == {(point.vine, point.spur)}
+    assert (point.kind, point.cane, point.nodes_kept, point.nodes_seen) == ("removal", -1, 0, 0)
+    permanent = [each for each in oracle.obstacles_of(ROW).capsules if each.kind == "cordon"]
+    assert {each.spur for each in permanent} == {-1}
 
 
 @pytest.mark.long
