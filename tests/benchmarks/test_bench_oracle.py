@@ -78,18 +78,18 @@ def test_of_a_guyot_vine_both_canes_stay_and_last_years_cane_is_in_the_way_with_
 
 
 @pytest.mark.long
-def test_the_fruiting_wire_alone_leaves_no_plan_for_the_removal_of_last_years_cane():
+def test_last_years_cane_has_a_plan_where_it_rises_from_the_head_and_none_where_it_lies_on_the_wire_from_there():
     guyot = oracle.Oracle(guyot=True)
-    removal = next(each for each in wanted_cuts(GUYOT, guyot=True) if each.kind == "removal")
-    plan, reason = guyot.search(GUYOT, removal, removal.cut)
-    assert plan is None and "wire" in reason
-    rods = tuple(None if rod is not None and rod.kind == "wire" else rod for rod in GUYOT.rods)
-    plan, reason = guyot.search(replace(GUYOT, rods=rods), removal, removal.cut)
-    assert plan is not None and reason == ""
-    assert removal.cut.holds(removal.cut.rod, removal.cut.best + plan.along * removal.cut.tangent)
-    np.testing.assert_allclose(
-        plan.poses.cut.translation, removal.cut.best + plan.along * removal.cut.tangent, atol=1e-6
-    )
+    level = grow(VineyardConfig(vines=1, training="guyot", rows_behind=0, guyot_head=0.0), 3601)
+    bare = replace(level, rods=tuple(None if rod is not None and rod.kind == "wire" else rod for rod in level.rods))
+    for row, planned in ((GUYOT, True), (level, False), (bare, True)):
+        removal = next(each for each in wanted_cuts(row, guyot=True) if each.kind == "removal")
+        plan, reason = guyot.search(row, removal, removal.cut)
+        assert (plan is not None) == planned and ("wire" in reason) == (not planned)
+        if plan is not None:
+            place = removal.cut.best + plan.along * removal.cut.tangent
+            assert removal.cut.holds(removal.cut.rod, place)
+            np.testing.assert_allclose(plan.poses.cut.translation, place, atol=1e-6)
 
 
 @pytest.mark.long
