@@ -63,33 +63,33 @@ def test_blades_slant_to_pass_a_cane_that_stays_beside_a_cut_between_nodes(searc
 GUYOT = grow(VineyardConfig(vines=1, training="guyot", rows_behind=0), 3601)
 
 
-def test_of_a_guyot_vine_both_canes_stay_and_last_years_cane_is_in_the_way_but_for_its_own_removal():
+def test_of_a_guyot_vine_both_canes_stay_and_last_years_cane_is_in_the_way_with_the_number_of_its_spur():
     removal = next(each for each in wanted_cuts(GUYOT, guyot=True) if each.kind == "removal")
     capsules = oracle.obstacles_of(GUYOT, guyot=True).capsules
     canes = {(each.spur, each.cane) for each in capsules if each.kind == "cane"}
     assert canes == {(each.spur, each.cane) for each in wanted_cuts(GUYOT, guyot=True) if each.cane >= 0 and each.cut}
     cordons = [each for each in capsules if each.kind == "cordon"]
     arm = [rod for _, rod in GUYOT.standing() if rod.kind == "cordon"]
-    assert len(cordons) == len(arm)
-    left = [each for each in oracle.obstacles_of(GUYOT, True, removal.cut.rod).capsules if each.kind == "cordon"]
-    assert left == [each for each in cordons if each.start != tuple(GUYOT.rods[removal.cut.rod].start)]
     point = oracle.point_of(GUYOT, removal, removal.cut, guyot=True)
-    assert (point.vine, point.spur) not in {(each.vine, each.spur) for each in capsules}, "the spur's canes stay"
+    assert len(cordons) == len(arm) and {(each.vine, each.spur) for each in cordons} == {(point.vine, point.spur)}
+    assert (point.kind, point.cane, point.nodes_kept, point.nodes_seen) == ("removal", -1, 0, 0)
+    permanent = [each for each in oracle.obstacles_of(ROW).capsules if each.kind == "cordon"]
+    assert {each.spur for each in permanent} == {-1}
 
 
 @pytest.mark.long
-def test_the_fruiting_wire_alone_leaves_no_plan_for_the_removal_of_last_years_cane():
+def test_last_years_cane_has_a_plan_where_it_rises_from_the_head_and_none_where_it_lies_on_the_wire_from_there():
     guyot = oracle.Oracle(guyot=True)
-    removal = next(each for each in wanted_cuts(GUYOT, guyot=True) if each.kind == "removal")
-    plan, reason = guyot.search(GUYOT, removal, removal.cut)
-    assert plan is None and "wire" in reason
-    rods = tuple(None if rod is not None and rod.kind == "wire" else rod for rod in GUYOT.rods)
-    plan, reason = guyot.search(replace(GUYOT, rods=rods), removal, removal.cut)
-    assert plan is not None and reason == ""
-    assert removal.cut.holds(removal.cut.rod, removal.cut.best + plan.along * removal.cut.tangent)
-    np.testing.assert_allclose(
-        plan.poses.cut.translation, removal.cut.best + plan.along * removal.cut.tangent, atol=1e-6
-    )
+    level = grow(VineyardConfig(vines=1, training="guyot", rows_behind=0, guyot_head=0.0), 3601)
+    bare = replace(level, rods=tuple(None if rod is not None and rod.kind == "wire" else rod for rod in level.rods))
+    for row, planned in ((GUYOT, True), (level, False), (bare, True)):
+        removal = next(each for each in wanted_cuts(row, guyot=True) if each.kind == "removal")
+        plan, reason = guyot.search(row, removal, removal.cut)
+        assert (plan is not None) == planned and ("wire" in reason) == (not planned)
+        if plan is not None:
+            place = removal.cut.best + plan.along * removal.cut.tangent
+            assert removal.cut.holds(removal.cut.rod, place)
+            np.testing.assert_allclose(plan.poses.cut.translation, place, atol=1e-6)
 
 
 @pytest.mark.long

@@ -249,6 +249,23 @@ def test_the_removal_of_last_years_cane_is_asked_for_and_has_its_own_reason():
     assert outcomes([bite(old, 0.2)])[2][1] == "wrong", "shoots of last year's cane stay"
 
 
+def test_a_removal_that_was_proposed_has_its_own_outcome_wherever_on_last_years_cane():
+    row = grow(VineyardConfig(vines=1, training="guyot"), 3)
+    wanted = wanted_cuts(row, guyot=True)
+    old = wanted[-1]
+    shoot = next(rod for _, rod in row.standing() if rod.spur == 1 and rod.cane == 0)
+    for place in (old.cut.best, shoot.start + 0.6 * (shoot.end - shoot.start)):
+        told = point("r", tuple(place.tolist()), vine=1, spur=1, kind="removal", cane=-1)
+        ended = m.QueueEntry(point_id="r", state="UNREACHABLE", reason=reasons.out_of_reach(0.9, 1.6))
+        reviewer = SimpleNamespace(points={"r": told}, accepted={"r": ended}, refusals={})
+        found = bench.places(row, wanted, [], reviewer, {"r": ended}, [])
+        assert [(each.kind, each.outcome, each.reason) for each in found] == [
+            ("spur cut", "unseen", ""),
+            ("cane cut", "unseen", ""),
+            ("removal", "refused", "out_of_reach"),
+        ]
+
+
 class Stopping:
     """A loop whose work ends in protective stops, and goes on after each has been acknowledged and resumed."""
 
