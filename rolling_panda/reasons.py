@@ -1927,6 +1927,11 @@ def renewal_cut_fixed() -> None:
     """A renewal cut is on the old stub."""
 
 
+@_reason("warning", "reject it, and place one by hand")
+def removal_fixed() -> None:
+    """A removal is beside the head of the vine."""
+
+
 @_reason("info", "")
 def rule_in_force() -> None:
     """This rule is in force already."""

@@ -50,7 +50,8 @@ class PruningPoint(Struct, frozen=True, forbid_unknown_fields=True):
             same cane for as long as perception runs; -1 if unknown.
         reason: Explanation of the cut for a grower.
         kind: `spur cut` shortens the cane that stays, `renewal cut` removes the old stub, `cane cut` shortens the
-            fruiting cane, `by hand` was placed by a person.
+            fruiting cane, `removal` takes last year's cane of a Guyot vine off its head, `by hand` was placed by a
+            person.
         position_covariance: Covariance of the position (m²): xx, xy, xz, yy, yz, zz.
         tangent_covariance: Covariance of the tangent in the same order.
         offset: Distance past the last kept node along the cane (m); None without a kept node below the cut.

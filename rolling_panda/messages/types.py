@@ -52,7 +52,7 @@ WoodClass = Literal[
 #: Index = value in a label image.
 WOOD_CLASSES: tuple[WoodClass, ...] = get_args(WoodClass)
 BridgeKind = Literal["sim", "real", "fakes"]
-CutKind = Literal["spur cut", "renewal cut", "cane cut", "by hand"]
+CutKind = Literal["spur cut", "renewal cut", "cane cut", "removal", "by hand"]
 Digest = Annotated[str, Meta(max_length=64, pattern=r"^[0-9a-f]*(?!\n)$")]
 Covariance = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
 

@@ -19,7 +19,7 @@ export type JointOffsets = [number, number, number, number, number, number, numb
 
 export type Covariance = [number, number, number, number, number, number];
 
-export type CutKind = "spur cut"|"renewal cut"|"cane cut"|"by hand";
+export type CutKind = "spur cut"|"renewal cut"|"cane cut"|"removal"|"by hand";
 
 export type Need = "another look"|"operator"|"nothing";
 
@@ -133,7 +133,7 @@ export interface PruningPoint {
   spur: number;
   /** Explanation of the cut for a grower. */
   reason: Reason;
-  /** `spur cut` shortens the cane that stays, `renewal cut` removes the old stub, `cane cut` shortens the fruiting cane, `by hand` was placed by a person. */
+  /** `spur cut` shortens the cane that stays, `renewal cut` removes the old stub, `cane cut` shortens the fruiting cane, `removal` takes last year's cane of a Guyot vine off its head, `by hand` was placed by a person. */
   kind: CutKind;
   /** Covariance of the position (m²): xx, xy, xz, yy, yz, zz. */
   position_covariance: Covariance|null;
