@@ -1,6 +1,6 @@
 """What states of the operator's page are made of: robots, queues, who holds control, and the way back from a state."""
 
-from typing import Any
+from typing import Any, get_args
 
 import msgspec
 from playwright.sync_api import Locator, Page, expect
@@ -54,15 +54,16 @@ def queue() -> tuple[p.PagePoint, ...]:
 
 
 def of_kind(row: p.PagePoint, kind: CutKind, reason: m.Reason, **changes: Any) -> p.PagePoint:
-    """The same point with a cut of another kind."""
-    return msgspec.structs.replace(row, point=msgspec.structs.replace(row.point, kind=kind, reason=reason, **changes))
+    """The same point with a cut of another kind, which has another hash."""
+    digest = f"{get_args(CutKind).index(kind)}" + row.point.digest[1:]
+    changed = msgspec.structs.replace(row.point, kind=kind, reason=reason, digest=digest, **changes)
+    return msgspec.structs.replace(row, point=changed)
 
 
 def removal(row: p.PagePoint) -> p.PagePoint:
     """The same point as a removal of last year's cane: nothing on it is counted."""
-    return of_kind(
-        row, "removal", said("last year's cane"), nodes_kept=0, nodes_seen=0, offset=None, node_distance=None, radius=0.007
-    )
+    nothing: dict[str, Any] = {"nodes_kept": 0, "nodes_seen": 0, "offset": None, "node_distance": None}
+    return of_kind(row, "removal", said("between the head and the first shoot"), radius=0.007, **nothing)
 
 
 def guyot_vine() -> tuple[p.PagePoint, ...]:
