@@ -63,7 +63,7 @@ def of_kind(row: p.PagePoint, kind: CutKind, reason: m.Reason, **changes: Any) -
 def removal(row: p.PagePoint) -> p.PagePoint:
     """The same point as a removal of last year's cane: nothing on it is counted."""
     nothing: dict[str, Any] = {"nodes_kept": 0, "nodes_seen": 0, "offset": None, "node_distance": None}
-    return of_kind(row, "removal", said("between the head and the first shoot"), radius=0.007, **nothing)
+    return of_kind(row, "removal", said("Between the head and the first cane on it"), radius=0.007, **nothing)
 
 
 def guyot_vine() -> tuple[p.PagePoint, ...]:
