@@ -1660,11 +1660,6 @@ def moved_below_nodes(user: str) -> None:
 
 
 @_reason("info", "")
-def old_cane_left() -> None:
-    """Last year's cane is left for a person: the program takes it for a cordon, and keeps the blades off it."""
-
-
-@_reason("info", "")
 def old_cane_unseen() -> None:
     """Last year's cane is not seen where it leaves the trunk."""
 
@@ -1937,7 +1932,7 @@ def renewal_cut_fixed() -> None:
     """A renewal cut is on the old stub."""
 
 
-@_reason("warning", "reject it, and place one by hand")
+@_reason("warning", "reject it, and cut it with hand shears")
 def removal_fixed() -> None:
     """A removal is beside the head of the vine."""
 

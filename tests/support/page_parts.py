@@ -1,13 +1,16 @@
 """What states of the operator's page are made of: robots, queues, who holds control, and the way back from a state."""
 
-from typing import Any
+from typing import Any, get_args
 
 import msgspec
 from playwright.sync_api import Locator, Page, expect
 
 from rolling_panda import messages as m
+from rolling_panda import reasons
 from rolling_panda.messages import page as p
 from rolling_panda.messages.supervision import ControlState, PointPlan, PreviewState
+from rolling_panda.messages.types import CutKind
+from rolling_panda.reasons import said
 from tests.support.played_server import PlayedServer, controller, point
 from tests.support.points import rolled_out
 
@@ -47,6 +50,28 @@ def queue() -> tuple[p.PagePoint, ...]:
         point(4, "PROPOSED", vine=2),
         point(5, "REJECTED", vine=2, spur=2, user="Ada", reason="rejected by Ada: too near a wire"),
         point(6, "DONE", vine=2, spur=3, cut_id="c6", user="Ada", reason="cut"),
+    )
+
+
+def of_kind(row: p.PagePoint, kind: CutKind, reason: m.Reason, **changes: Any) -> p.PagePoint:
+    """The same point with a cut of another kind, which has another hash."""
+    digest = f"{get_args(CutKind).index(kind)}" + row.point.digest[1:]
+    changed = msgspec.structs.replace(row.point, kind=kind, reason=reason, digest=digest, **changes)
+    return msgspec.structs.replace(row, point=changed)
+
+
+def removal(row: p.PagePoint) -> p.PagePoint:
+    """The same point as a removal of last year's cane: nothing on it is counted."""
+    nothing: dict[str, Any] = {"nodes_kept": 0, "nodes_seen": 0, "offset": None, "node_distance": None}
+    return of_kind(row, "removal", said("Between the head and the first cane on it"), radius=0.007, **nothing)
+
+
+def guyot_vine() -> tuple[p.PagePoint, ...]:
+    """The three cuts of a Guyot vine: the next spur, the next fruiting cane, and last year's cane off."""
+    return (
+        of_kind(point(1, "ACCEPTED", user="Ada"), "spur cut", reasons.guyot_cut_lower(20.0, 2)),
+        of_kind(point(2, "PROPOSED"), "cane cut", reasons.guyot_cut_upper(20.0, 8), nodes_kept=8),
+        removal(point(3, "PROPOSED")),
     )
 
 

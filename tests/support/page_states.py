@@ -29,6 +29,7 @@ from server.api.responses import outcome
 from tests.support.page_parts import (
     accepted,
     choose,
+    guyot_vine,
     held,
     looking_at,
     mark,
@@ -123,6 +124,15 @@ def _rule(page: Page, server: PlayedServer) -> None:
     if server.role != "viewer":
         page.locator("#rule-offset").press("ArrowRight")
         expect(page.locator("#rule-apply")).to_be_enabled()
+
+
+def _guyot(page: Page, server: PlayedServer) -> None:
+    working(page, server)
+    server.rule = m.PruningRule(system="guyot")
+    show(server, *guyot_vine())
+    choose(page, "p3")
+    page.locator(".adjust summary").click()
+    expect(page.locator("rp-adjust .moves")).to_be_visible()
 
 
 def _order(page: Page, server: PlayedServer) -> None:
@@ -434,6 +444,7 @@ STATES: dict[str, State] = {
     "all-states": _all_states,
     "refused-plan": _refused_plan,
     "rule": _rule,
+    "guyot": _guyot,
     "order": _order,
     "why-rejected": _why_rejected,
     "by-hand": _by_hand,

@@ -11,7 +11,7 @@ from rolling_panda import reasons
 from rolling_panda.messages import page as p
 from rolling_panda.messages.perception import SpurDrawing
 from tests.support.drawings import COLUMN
-from tests.support.page_parts import mark, open_screen, planned, ready, show
+from tests.support.page_parts import mark, of_kind, open_screen, planned, ready, removal, show
 from tests.support.played_page import box_of, until
 from tests.support.played_server import PlayedServer, controller, point
 
@@ -207,12 +207,18 @@ def test_what_waits_for_a_person_is_the_same_number_everywhere(page: Page, serve
     expect(page.locator("#needs-you")).to_have_text("3 need you")
 
 
-def test_two_cuts_of_a_spur_are_told_apart_by_their_kind(page: Page, server: PlayedServer) -> None:
-    renewal = point(2, "ACCEPTED")
-    renewal = msgspec.structs.replace(renewal, point=msgspec.structs.replace(renewal.point, kind="renewal cut"))
-    show(server, planned(point(1, "ACCEPTED"), 1), planned(renewal, 2), planned(point(3, "ACCEPTED", spur=2), 3))
+def test_the_cuts_of_a_spur_are_told_apart_by_their_kind(page: Page, server: PlayedServer) -> None:
+    renewal = of_kind(point(2, "ACCEPTED"), "renewal cut", reasons.renewal_cut(1))
+    old = removal(point(4, "ACCEPTED"))
+    show(
+        server,
+        planned(point(1, "ACCEPTED"), 1),
+        planned(renewal, 2),
+        planned(old, 3),
+        planned(point(3, "ACCEPTED", spur=2), 4),
+    )
     open_screen(page, "work")
-    names = ["Spur 1 · Spur cut", "Spur 1 · Renewal cut", "Spur 2"]
+    names = ["Spur 1 · Spur cut", "Spur 1 · Renewal cut", "Spur 1 · Removal", "Spur 2"]
     expect(page.locator("rp-work .cut-place")).to_have_text(names)
     open_screen(page, "review")
     page.locator("rp-order summary").click()

@@ -10,11 +10,12 @@ from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.messages import page as p
 from rolling_panda.messages.supervision import PointPlan
+from rolling_panda.messages.types import CutKind
 from rolling_panda.reasons import text_of
 from server.api.responses import outcome
 from tests.support.deciding_server import DecidingServer
-from tests.support.drawings import CUT, METRES, SIZE
-from tests.support.page_parts import looking_at, mark, ready, show
+from tests.support.drawings import CUT, METRES, SHOOTS, SIZE
+from tests.support.page_parts import looking_at, mark, of_kind, ready, removal, show
 from tests.support.played_page import box_of, until
 from tests.support.played_server import PlayedServer, point
 from tests.support.points import rolled_out
@@ -475,16 +476,62 @@ def test_a_point_is_moved_by_millimetres_and_an_accepted_one_is_not(page: Page, 
     expect(page.locator("rp-review .handle")).to_have_attribute("visibility", "hidden")
 
 
-def test_a_renewal_cut_is_not_moved_and_says_why(page: Page, server: DecidingServer) -> None:
+@pytest.mark.parametrize(
+    ("kind", "why"), [("renewal cut", reasons.renewal_cut_fixed()), ("removal", reasons.removal_fixed())]
+)
+def test_a_renewal_cut_and_a_removal_are_not_moved_and_say_why(
+    page: Page, server: DecidingServer, kind: CutKind, why: m.Reason
+) -> None:
     row = server.points[0]
-    renewal = msgspec.structs.replace(row.point, kind="renewal cut")
-    server.points = (msgspec.structs.replace(row, point=renewal), *server.points[1:])
-    server.tell(server.page_points())
+    server.put(removal(row) if kind == "removal" else of_kind(row, kind, reasons.renewal_cut(1)))
     looking_at(page, "p1")
     page.locator(".adjust summary").click()
-    told = text_of(reasons.renewal_cut_fixed())
-    expect(page.get_by_role("button", name="+1")).to_have_attribute("title", told)
+    for step in ("−5", "−1", "+1", "+5"):
+        button = page.get_by_role("button", name=step)
+        expect(button).to_be_disabled()
+        expect(button).to_have_attribute("title", text_of(why))
     expect(page.locator("rp-review .handle")).to_have_attribute("visibility", "hidden")
+    page.get_by_role("button", name="+1").click(force=True)
+    assert server.posted == []
+
+
+def test_a_removal_names_last_years_cane_and_counts_no_buds(page: Page, server: DecidingServer) -> None:
+    server.put(removal(server.points[0]))
+    review = looking_at(page, "p1")
+    expect(review.locator(".review-keeps")).to_have_text("Removal · last year's cane · sure")
+    picture = review.locator("rp-cut-picture")
+    # The wood that lies falls beyond the cut, with the shoots on it.
+    expect(picture.locator(".falls path")).to_have_count(1 + len(SHOOTS))
+    expect(picture.locator(".nodes circle")).to_have_count(0)
+    facts = page.locator("rp-adjust dl")
+    page.locator(".adjust summary").click()
+    expect(facts.locator("div:visible dt")).to_have_text(["Cut", "Sure", "Cane", "Place", "Clear of"])
+    expect(facts.locator("dd").first).to_have_text("Removal")
+    # Another cut tells of its buds again.
+    mark(page, "p3").click()
+    looking_at(page, "p3")
+    expect(facts).to_contain_text("2 of 9 buds")
+
+
+@pytest.mark.parametrize(("language", "width"), [("de", 1024), ("es", 390)])
+def test_the_words_beside_the_approach_leave_each_other_room(
+    page: Page, server: DecidingServer, language: str, width: int
+) -> None:
+    page.evaluate("language => localStorage.setItem('setting.language', language)", language)
+    page.set_viewport_size({"width": width, "height": 800})
+    page.reload()
+    looking_at(page, "p1")
+    page.locator(".adjust summary").click()
+    row = page.locator("rp-adjust .approach > :not(input)")
+    expect(row).to_have_count(3)
+    boxes = [box_of(row.nth(k)) for k in range(3)]
+    # The words, not only their boxes, end where they should.
+    assert row.evaluate_all("all => all.filter(each => each.scrollWidth > each.clientWidth + 1).length") == 0
+    for k, one in enumerate(boxes):
+        for other in boxes[k + 1 :]:
+            beside = one["x"] + one["width"] <= other["x"] or other["x"] + other["width"] <= one["x"]
+            below = one["y"] + one["height"] <= other["y"] or other["y"] + other["height"] <= one["y"]
+            assert beside or below
 
 
 def test_where_the_robot_would_stand_is_told(page: Page, server: DecidingServer) -> None:

@@ -11,7 +11,7 @@ from rolling_panda import reasons
 from rolling_panda.messages import page as p
 from tests.support.deciding_server import DecidingServer
 from tests.support.page_host import ORIGIN
-from tests.support.page_parts import looking_at, mark, ready, show
+from tests.support.page_parts import looking_at, mark, ready, removal, show
 from tests.support.played_page import until
 from tests.support.played_server import point
 
@@ -91,6 +91,15 @@ def test_one_press_accepts_the_sure_cuts_as_they_are_shown_and_another_leaves_th
     left = [body for path, body in server.posted if path == "/api/sites/leave"]
     assert left == [{"vine": 1, "spur": spur, "left": True} for spur in (5, 6)]
     assert [server.state_of(name) for name in ("p3", "p4")] == ["PROPOSED", "PROPOSED"]
+
+
+def test_a_removal_is_accepted_with_the_other_sure_cuts(page: Page, server: DecidingServer) -> None:
+    server.put(removal(server.points[1]))
+    looking_at(page, "p1")
+    opened(page)
+    expect(card(page, "p2")).to_contain_text("Removal · last year's cane")
+    page.get_by_role("button", name="Accept 2 cuts").click()
+    until(page, lambda: asked(server, "accept") == {row.point.point_id: shown(row) for row in server.points[:2]})
 
 
 @pytest.mark.long

@@ -15,10 +15,10 @@ const SETTLE_MS = 150;
 /** Steps along the cane (mm). */
 const STEPS = Object.freeze([-5, -1, 1, 5]);
 
-/** Their words are `details.NAME`. @type {readonly (readonly [name: string, value: (point: PruningPoint) => string])[]} */
+/** Their words are `details.NAME`; one without a value is not shown. @type {readonly (readonly [name: string, value: (point: PruningPoint) => string])[]} */
 const FACTS = Object.freeze([
   ["cut", cutWords],
-  ["keeps", (point) => text("details.nodes", { kept: point.nodes_kept, seen: point.nodes_seen })],
+  ["keeps", keepsWords],
   ["sure", (point) => `${Math.floor(100 * point.confidence + 1e-9)} %`],
   ["cane", caneWords],
   ["place", placeWords],
@@ -30,6 +30,11 @@ function cutWords(point) {
   const kind = text(`details.kind.${point.kind}`);
   if (point.offset === null) return kind;
   return text("details.past", { kind, offset: Math.round(1000 * point.offset), node: point.nodes_kept });
+}
+
+/** Of last year's cane nothing stays, and its shoots are not counted. @param {PruningPoint} point */
+function keepsWords(point) {
+  return point.kind === "removal" ? "" : text("details.nodes", { kept: point.nodes_kept, seen: point.nodes_seen });
 }
 
 /** @param {PruningPoint} point */
@@ -120,7 +125,10 @@ export class RpAdjust extends HTMLElement {
     });
     FACTS.forEach(([, value], at) => {
       const node = this.values[at];
-      if (node) setText(node, value(row.point));
+      if (!node?.parentElement) return;
+      const words = value(row.point);
+      setText(node, words);
+      node.parentElement.hidden = words === "";
     });
     const { azimuth } = row.entry;
     const whyNot = whyNotTurn(row);

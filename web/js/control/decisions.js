@@ -129,6 +129,7 @@ export function reconsider(row) {
 export function whyNotMove(row) {
   if (isAccepted(row)) return reason("acceptance_stands", { point: row.point.point_id });
   if (row.point.kind === "renewal cut") return reason("renewal_cut_fixed");
+  if (row.point.kind === "removal") return reason("removal_fixed");
   return whyNotPoint("MovePoint", row) ?? whyNothingOf("perception");
 }
 

@@ -25,7 +25,9 @@ export function keepsWords({ point }) {
  * @param {...string} more
  */
 export function cutWords(point, ...more) {
-  const parts = [text(`details.kind.${point.kind}`), counted("review.keeps", point.nodes_kept), ...more];
+  // Of last year's cane nothing stays.
+  const keeps = point.kind === "removal" ? text("review.old_cane") : counted("review.keeps", point.nodes_kept);
+  const parts = [text(`details.kind.${point.kind}`), keeps, ...more];
   // A line ends between two of them alone.
   return parts.map((each) => each.replaceAll(" ", "\u00a0")).join("\u00a0· ");
 }
