@@ -47,7 +47,7 @@ from rolling_panda import messages as m
 from rolling_panda.commands import SURE
 from rolling_panda.config import load_section
 from rolling_panda.errors import InputError
-from rolling_panda.reasons import old_cane_left
+from rolling_panda.reasons import old_cane_unseen
 from tests.support.worlds.closed_loop import ClosedLoop
 
 Training = Literal["spur", "guyot"]
@@ -90,7 +90,7 @@ USUAL = "standard"
 #: Whole-body method of the robot.
 OURS = "hierarchy"
 #: Code of the reason that is told of last year's cane.
-_OLD_CANE_LEFT = old_cane_left().code
+_OLD_CANE_UNSEEN = old_cane_unseen().code
 #: Wood this near to a point, this far past the cut, still stands (m).
 _STANDS, _BEYOND = 0.012, 0.03
 
@@ -634,8 +634,8 @@ def places(
         spur = 0 if point.kind == "removal" else rod.spur
         proposed.setdefault((rod.vine, spur, point.kind), []).append(point.point_id)
     left = [(_spur_at(row, site), codes(site.reason)) for site in sites]
-    of_spurs = {spur: reason for spur, reason in left if reason != _OLD_CANE_LEFT}
-    of_old_canes = of_spurs | {spur: reason for spur, reason in left if reason == _OLD_CANE_LEFT}
+    of_spurs = {spur: reason for spur, reason in left if reason != _OLD_CANE_UNSEEN}
+    of_old_canes = of_spurs | {spur: reason for spur, reason in left if reason == _OLD_CANE_UNSEEN}
     out = []
     for each, cut in asked:
         truth = true_cut([each], pieces)

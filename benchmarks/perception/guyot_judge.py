@@ -1,4 +1,4 @@
-"""Judges points of a surveyed row of Guyot vines: back to a spur, past the nodes that fruit, and last year's cane off."""
+"""Judges points of a surveyed row of Guyot vines: back to a spur, past the nodes that fruit, last year's cane off."""
 
 from dataclasses import dataclass, field, replace
 

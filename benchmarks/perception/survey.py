@@ -1,7 +1,7 @@
 """`rolling-panda bench perception`: surveys of rows that nobody has seen, and the judge's opinion of every point.
 
-The robot drives along rows of up to three vines in its survey posture, and back over Guyot vines with the camera
-higher. Every frame goes through perception as it would on the wire. All figures are on accepted points, that is, on
+The robot drives along rows of up to three vines in its survey posture. Over Guyot vines the camera is farther away, and
+low on the way back. Every frame goes through perception as it would on the wire. All figures are on accepted points, that is, on
 every point shown; what perception left undecided is told apart.
 """
 
@@ -110,14 +110,16 @@ def survey_row(
     last = first + vines * config.vine_spacing
     points: tuple[m.PruningPoint, ...] = ()
     left_open: tuple[m.UndecidedSite, ...] = ()
-    way: list[tuple[float, tuple[float, ...] | None]]
-    way = [(x, None) for x in (np.arange(first, last + step, step) - _CAMERA_AHEAD).tolist()]
+    way: list[tuple[float, tuple[float, ...] | None, float]]
+    places = (np.arange(first, last + step, step) - _CAMERA_AHEAD).tolist()
+    work = WorkConfig()
+    way = [(x, work.survey_far if guyot else None, 1.0) for x in places]
     if guyot:
-        way += [(x, WorkConfig().survey_high) for x, _ in reversed(way)]
-    for sequence, (x, arm) in enumerate(way):
+        way += [(x, work.survey_low, -1.0) for x in reversed(places)]
+    for sequence, (x, arm, sense) in enumerate(way):
         base, position = survey_place(x, arm)
         place = camera_pose(model, base, position)
-        image = camera.render(row, place, sequence, np.array([SPEED if arm is None else -SPEED, *[0.0] * 5]))
+        image = camera.render(row, place, sequence, np.array([sense * SPEED, *[0.0] * 5]))
         frame = camera_frame(image, camera, base, position, sequence)
         opinion.look(image, camera.intrinsics, place)
         began = time.perf_counter()

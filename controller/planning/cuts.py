@@ -107,8 +107,7 @@ class CutPlanner:
         times = travel_times(self._config, self._flows, start, stops)
         fastest = [names[i] for i in shortest(times, leaving_times(self._config, request.q, stops))]
         tried = dict(request.tries)
-        removed_last = _removed_last(request, self._freed(request, cuts, fastest))
-        return sorted(removed_last, key=lambda name: name in tried)
+        return sorted(self._freed(request, cuts, fastest), key=lambda name: name in tried)
 
     def _freed(self, request: PlanRequest, cuts: dict[str, CutPlan], order: list[str]) -> list[str]:
         """The order with a stub before the cut on the same spur whose open blades would push a cane, if there is one.
@@ -170,19 +169,6 @@ class CutPlanner:
             for q in (cut.cut.q_clear, cut.cut.q_stand_off, cut.cut.q_cut):
                 out.update(np.ascontiguousarray(q, dtype="<f8").tobytes())
         return out.hexdigest()
-
-
-def _removed_last(request: PlanRequest, order: Sequence[str]) -> list[str]:
-    """The order with last year's cane of each vine after the other cuts there: a lot of wood falls with it."""
-    points = {point.point_id: point for point in request.points}
-    last = {points[name].vine: place for place, name in enumerate(order)}
-
-    def place(at: tuple[int, str]) -> tuple[int, bool]:
-        number, name = at
-        removal = points[name].kind == "removal"
-        return (last[points[name].vine] if removal else number), removal
-
-    return [name for _, name in sorted(enumerate(order), key=place)]
 
 
 #: The optimisation of the order ends when a round saves less than this (s).

@@ -1,8 +1,8 @@
 """The survey: a slow drive along the row with the arm in its survey posture, so that the camera sees every vine.
 
-If undecided sites need another look at the end, the robot drives back once and takes more pictures. Of Guyot vines it
-takes them from higher up, since their canes are cut higher than the first pictures reach. An operator can also send it
-to one undecided site: it takes pictures from both sides and from the front.
+If undecided sites need another look at the end, the robot drives back once and takes more pictures. A Guyot vine is cut
+from its head to past the eighth node: the camera is farther away on the way out, and nearer and low on the way back. An
+operator can also send the robot to one undecided site: it takes pictures from both sides and from the front.
 """
 
 import math
@@ -56,6 +56,8 @@ class Survey:
         self._config, self._follower, self._saturation, self._queue = config, follower, saturation, queue
         #: Posture of the arm on the way (7, rad); None is the survey posture.
         self._posture: Array | None = None
+        if queue.guyot and place is None:
+            self._posture = np.array(config.work.survey_far)
         self._homing: Homing | None = self._to_posture()
         c, s = math.cos(config.work.row_heading), math.sin(config.work.row_heading)
         self._along, self._left = np.array([c, s]), np.array([-s, c])
@@ -127,7 +129,7 @@ class Survey:
         if self._line is not None and not self._again and self._unclear() > 0:
             self._again, self._goal, self._there_at, self._moved = True, self._line[0], None, None
             if self._queue.guyot:
-                self._posture = np.array(self._config.work.survey_high)
+                self._posture = np.array(self._config.work.survey_low)
                 self._homing = self._to_posture()
             return StepResult(xi, events=(reasons.survey_returns(self._unclear()),))
         return StepResult(xi, finished=True, summary=self._summary())

@@ -233,15 +233,15 @@ def test_the_removal_of_last_years_cane_is_asked_for_and_has_its_own_reason():
         return [(each.kind, each.outcome, each.reason) for each in found]
 
     few = reasons.nodes_lacking(5, 8)
-    for told in ([reasons.old_cane_left(), few], [few, reasons.old_cane_left()]):
+    for told in ([reasons.old_cane_unseen(), few], [few, reasons.old_cane_unseen()]):
         assert outcomes([bite(lower)], *told) == [
             ("spur cut", "right", ""),
             ("cane cut", "undecided", "nodes_lacking"),
-            ("removal", "undecided", "old_cane_left"),
+            ("removal", "undecided", "old_cane_unseen"),
         ]
     # Whoever leaves the whole spur to a person leaves that cane, too; nothing told of it is nothing seen.
     assert outcomes([], few)[2] == ("removal", "undecided", "nodes_lacking")
-    assert [each[1] for each in outcomes([bite(lower), bite(upper)], reasons.old_cane_left())[:2]] == ["right"] * 2
+    assert [each[1] for each in outcomes([bite(lower), bite(upper)], reasons.old_cane_unseen())[:2]] == ["right"] * 2
     assert outcomes([])[2] == ("removal", "unseen", "")
     assert outcomes([bite(old)])[2] == ("removal", "right", "")
     _, outcome, harm = outcomes([bite(old, -0.03)])[2]

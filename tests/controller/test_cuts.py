@@ -72,16 +72,6 @@ def test_a_stub_goes_first_where_the_blades_would_push_a_cane_beside_the_cut_abo
     assert [each.point.point_id for each in plan.cuts] == ["cut", "stub"]
 
 
-@pytest.mark.long
-def test_last_years_cane_is_removed_after_the_other_cuts_of_its_vine() -> None:
-    """It is the first on the way along the row. Another vine's cuts keep their place."""
-    old, lower, upper = point("old", 0.2, kind="removal", vine=1), point("low", 0.5, vine=1), point("up", 0.6, vine=1)
-    plan = PLANNER.plan(request(old, lower, upper, point("next", 1.5, vine=2)))
-    assert [cut.point.point_id for cut in plan.cuts] == ["low", "up", "old", "next"]
-    plan = PLANNER.plan(replace(request(old, lower, upper), order=("old", "low", "up")))
-    assert [cut.point.point_id for cut in plan.cuts] == ["old", "low", "up"]
-
-
 def test_people_set_the_order() -> None:
     points = point("a", 0.2), point("b", 0.6), point("c", 1.0)
     plan = PLANNER.plan(replace(request(*points), order=("c", "a")))
