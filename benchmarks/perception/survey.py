@@ -1,8 +1,8 @@
 """`rolling-panda bench perception`: surveys of rows that nobody has seen, and the judge's opinion of every point.
 
 The robot drives along rows of up to three vines in its survey posture. Over Guyot vines the camera is farther away, and
-low on the way back. Every frame goes through perception as it would on the wire. All figures are on accepted points, that is, on
-every point shown; what perception left undecided is told apart.
+low on the way back. Every frame goes through perception as it would on the wire. All figures are on accepted points,
+that is, on every point shown; what perception left undecided is told apart.
 """
 
 import argparse

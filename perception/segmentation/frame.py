@@ -21,6 +21,8 @@ from rolling_panda.reasons import text_of
 
 #: Class indices, in the order of `WOOD_CLASSES`.
 BACKGROUND, GROUND, POST, TRUNK, CORDON, SPUR, CANE, NODE, WIRE, HOSE, OLD_CUT = range(len(WOOD_CLASSES))
+#: Classes of wood of the vine.
+ANY_WOOD = (TRUNK, CORDON, SPUR, CANE, NODE, OLD_CUT)
 #: Largest depth of one count (m).
 _MAX_DEPTH_UNIT = 0.01
 

@@ -10,7 +10,18 @@ from perception.arrays import Array, Index, Labels, Mask, distance
 from perception.config import SkeletonConfig
 from perception.plant.model import SURFACE_OFFSET, Cane, Node, Plant, Span, Spur
 from perception.segmentation.depth_inpainting import inpaint_depth, interpolate_lost_depth
-from perception.segmentation.frame import BACKGROUND, CANE, CORDON, NODE, OLD_CUT, SPUR, TRUNK, View, class_pixels
+from perception.segmentation.frame import (
+    ANY_WOOD,
+    BACKGROUND,
+    CANE,
+    CORDON,
+    NODE,
+    OLD_CUT,
+    SPUR,
+    TRUNK,
+    View,
+    class_pixels,
+)
 from perception.skeleton.centreline import Centreline, base_radius, centrelines
 from perception.skeleton.fragments import find_cane_pixels, find_fragments
 from perception.skeleton.linking import link_fragments
@@ -66,7 +77,8 @@ def trace_old_canes(view: View, labels: Labels, config: SkeletonConfig) -> list[
     if not trunks:
         return []
     tree, out = cKDTree(np.concatenate(trunks)), []
-    for line in trace_canes(view, wood_of_cut(labels, "removal"), config):
+    others = np.where(np.isin(labels, (CANE, NODE)), np.uint8(BACKGROUND), labels)
+    for line in trace_canes(view, np.where(labels == CORDON, np.uint8(CANE), others), config):
         gaps, _ = tree.query([line.axis[0], line.axis[-1]])
         cane = _cane(line, bool(gaps[1] < gaps[0]), float(gaps.min()))
         off, _ = tree.query(cane.base - float(gaps.min()) * cane.tangent(float(cane.arc[0])))
@@ -76,15 +88,14 @@ def trace_old_canes(view: View, labels: Labels, config: SkeletonConfig) -> list[
 
 
 def wood_of_cut(labels: Labels, kind: CutKind) -> Labels:
-    """The classes (H×W) with the wood that a cut of a kind severs as canes.
+    """The classes (H×W) of a picture from near, with the wood that a cut of a kind may be on as canes.
 
-    A renewal cut is on a stub, and a removal on last year's cane, whose class is that of a cordon.
+    A renewal cut is on a stub. A removal is on last year's cane: from near the network takes it for any wood.
     """
     if kind == "renewal cut":
         return np.where(labels == SPUR, np.uint8(CANE), labels)
     if kind == "removal":
-        others = np.where(np.isin(labels, (CANE, NODE)), np.uint8(BACKGROUND), labels)
-        return np.where(labels == CORDON, np.uint8(CANE), others)
+        return np.where(np.isin(labels, ANY_WOOD), np.uint8(CANE), labels)
     return labels
 
 

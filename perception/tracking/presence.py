@@ -5,7 +5,7 @@ from typing import Literal
 import numpy as np
 
 from perception.arrays import Array, Labels
-from perception.segmentation.frame import CANE, CORDON, NODE, POST, SPUR, TRUNK, View
+from perception.segmentation.frame import ANY_WOOD, CANE, NODE, POST, SPUR, TRUNK, View
 from rolling_panda.messages.types import CutKind
 
 #: Largest depth difference of the same wood (m).
@@ -32,9 +32,9 @@ def wood_presence(
         labels: H×W class indices.
         positions: To check.
         aside: How far aside it may be seen (m).
-        kind: Of the cut of that wood. That of a removal may have the class of a cordon, too.
+        kind: Of the cut of that wood. That of a removal may have the class of any wood.
     """
-    classes = (CANE, NODE, SPUR, CORDON) if kind == "removal" else (CANE, NODE, SPUR)
+    classes = ANY_WOOD if kind == "removal" else (CANE, NODE, SPUR)
     return [_at(view, labels, u, v, z, aside, classes) for u, v, z in view.pixels(positions).tolist()]
 
 

@@ -80,7 +80,7 @@ def test_over_guyot_vines_the_camera_is_far_on_the_way_out_and_low_on_the_way_ba
             sense, posture = (1, out) if r.q[0] > before else (-1, back)
             ways[sense].append(np.abs(r.q[ARM_Q] - posture).max())
     assert abs(r.q[0]) < 0.03
-    assert all(len(way) > 100 and max(way) < 0.02 for way in ways.values())
+    assert {k: (len(w) > 100, max(w) < 0.02) for k, w in ways.items()} == {1: (True, True), -1: (True, True)}
 
 
 def test_it_comes_back_to_its_line_when_it_begins_askew():
