@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from perception.config import RuleConfig
 from perception.plant.model import Cane, Node, Span, Spur
-from perception.rules.keep_out import KeepOut
+from perception.rules.keep_out import NO_KEEP_OUT, KeepOut
 from perception.rules.pruning import Decision, apply_rule, choose_keeper, count_nodes, cut_arc, cutting_force
 from rolling_panda import reasons
 from rolling_panda.commands import SURE
@@ -406,7 +406,7 @@ def test_the_lower_cane_keeps_two_nodes_and_the_upper_one_eight():
     # 20 mm past the second and the eighth node; the basal bud is not counted.
     np.testing.assert_allclose(short.position, [0.0, 0.0, 0.90 + 0.18 + 0.02], atol=1e-9)
     np.testing.assert_allclose(long.position, [0.06, 0.0, 0.93 + 0.66 + 0.02], atol=1e-9)
-    assert decision.undecided == (reasons.old_cane_left(),)
+    assert decision.undecided == (reasons.old_cane_unseen(),)
     assert [cut.reason.code for cut in decision.cuts] == ["guyot_cut_lower", "guyot_cut_upper"]
 
 
@@ -435,17 +435,74 @@ def test_a_cane_that_leaves_the_view_too_early_is_not_tipped():
 @pytest.mark.parametrize("canes", [(), (LOWER,), (LOWER, UPPER, guyot_cane(TEN, 0.1, 0.95))])
 def test_anything_but_two_canes_is_left_for_a_person(canes):
     decision = apply_rule(guyot_spur(*canes), GUYOT)
-    assert not decision.cuts and decision.undecided == (reasons.not_two_canes(len(canes)),)
+    assert not decision.cuts and decision.undecided == (reasons.not_two_canes(len(canes)), reasons.old_cane_unseen())
 
 
 def test_doubts_end_in_no_cut():
     assert not apply_rule(guyot_spur(LOWER, UPPER, incomplete=reasons.spur_at_image_edge()), GUYOT).cuts
     alike = guyot_spur(LOWER, guyot_cane(TEN, 0.06, 0.902))
-    assert apply_rule(alike, GUYOT).undecided == (reasons.canes_at_same_height(),)
+    assert apply_rule(alike, GUYOT).undecided == (reasons.canes_at_same_height(), reasons.old_cane_unseen())
     close = apply_rule(guyot_spur(LOWER, guyot_cane(TEN, 0.01, 0.93)), GUYOT)
     assert not close.cuts and reasons.cane_crosses_cut() in close.undecided
     thick = apply_rule(guyot_spur(LOWER, guyot_cane(TEN, 0.06, 0.93, radius=0.009)), GUYOT)
     assert [cut.kind for cut in thick.cuts] == ["spur cut"]
+
+
+def old_cane(begin=0.01, length=0.5, radius=0.0068, **changes):
+    """From the trunk outwards and up; `begin` is hidden."""
+    arc = np.linspace(begin, length, 100)
+    axis = np.array([0.0, 0.0, 0.85]) + arc[:, None] * np.array([0.8, 0.0, 0.6])
+    return Cane(axis, arc, radius, (), changes.pop("hidden", ()), "hidden", begin)
+
+
+def removal_of(old, keep_out=NO_KEEP_OUT, *canes):
+    decision = apply_rule(guyot_spur(*(canes or (LOWER, UPPER))), GUYOT, None, keep_out, old)
+    return next((cut for cut in decision.cuts if cut.kind == "removal"), None), decision
+
+
+def test_last_years_cane_is_cut_off_beside_the_trunk_and_keeps_no_node():
+    cut, decision = removal_of(old_cane())
+    np.testing.assert_allclose(cut.position, [0.8 * 0.04, 0.0, 0.85 + 0.6 * 0.04], atol=1e-6)
+    np.testing.assert_allclose(cut.tangent, [0.8, 0.0, 0.6], atol=1e-6)
+    assert (cut.nodes_seen, cut.nodes_kept, cut.cane, cut.offset) == (0, 0, -1, None)
+    assert cut.reason == reasons.old_cane_removed(1000 * 0.04) and not decision.undecided
+    # It may be cut farther out, and hardly nearer to the head.
+    assert cut.inward == pytest.approx(0.01) and cut.outward == pytest.approx(0.08)
+    assert cut.confidence == pytest.approx(1.0 - 0.01 / 0.12)
+
+
+def test_last_years_cane_is_cut_where_it_is_seen_and_the_less_is_seen_the_less_sure_it_is():
+    cut, _ = removal_of(old_cane(begin=0.06))
+    assert cut.position[0] == pytest.approx(0.8 * 0.07) and cut.inward < 0.003
+    assert cut.confidence == pytest.approx(0.5) and cut.confidence < SURE
+    hidden, _ = removal_of(old_cane(hidden=(Span(0.035, 0.065),)))
+    assert hidden.position[0] == pytest.approx(0.8 * 0.08)
+    for unseen in (old_cane(begin=0.13), old_cane(length=0.04), old_cane(hidden=(Span(0.02, 0.2),))):
+        cut, decision = removal_of(unseen)
+        assert cut is None and decision.undecided == (reasons.cut_place_hidden(),)
+
+
+def test_last_years_cane_is_cut_farther_out_where_something_is_beside_it():
+    wire = KeepOut(lambda position: WIRE if position[0] < 0.05 else None, lambda position, tangent: True)
+    cut, _ = removal_of(old_cane(), wire)
+    assert cut.position[0] == pytest.approx(0.8 * 0.07) and cut.inward < 0.01
+    everywhere = KeepOut(lambda position: WIRE, lambda position, tangent: True)
+    assert removal_of(old_cane(), everywhere)[1].undecided[0] == WIRE
+    crossing = guyot_cane(TEN, 0.03, 0.85)
+    assert removal_of(old_cane(), NO_KEEP_OUT, crossing, UPPER)[0].position[0] > 0.03 + 0.01
+
+
+def test_last_years_cane_beyond_the_shears_is_left_with_its_thickness():
+    cut, decision = removal_of(old_cane(radius=0.009))
+    assert cut is None and decision.undecided == (reasons.cane_beyond_shears(2000 * 0.009),)
+
+
+def test_last_years_cane_goes_where_the_canes_of_the_spur_are_left_for_a_person():
+    decision = apply_rule(guyot_spur(LOWER), GUYOT, old_cane=old_cane())
+    assert [cut.kind for cut in decision.cuts] == ["removal"]
+    assert decision.undecided == (reasons.not_two_canes(1),)
+    # Spur-pruned vines have none: what looks like it is an arm.
+    assert all(cut.kind != "removal" for cut in apply_rule(guyot_spur(LOWER), RuleConfig(), old_cane=old_cane()).cuts)
 
 
 def test_the_spur_rule_is_the_usual_one():
