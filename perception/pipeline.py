@@ -22,7 +22,7 @@ from perception.plant.numbering import SpurNumber, SpurNumbering
 from perception.plant.undecided_sites import UndecidedSites, undecided_site
 from perception.rules.keep_out import frame_keep_out, map_keep_out
 from perception.rules.manual import move_cut, place_cut
-from perception.rules.pruning import Decision, apply_rule
+from perception.rules.pruning import Cut, Decision, apply_rule
 from perception.segmentation.frame import CORDON, UnusablePictureError, View, decode_frame
 from perception.segmentation.network_segmenter import NetworkSegmenter
 from perception.segmentation.segmenter import Segmenter
@@ -82,7 +82,6 @@ _CANES_NEAR = 2.0
 _UNFAMILIAR_FRAMES = 2
 #: Kinds of cuts that are on no cane that stays.
 _BESIDE_CANES = ("renewal cut", "removal")
-_OLD_CANE_UNSEEN = reasons.old_cane_unseen()
 #: Rule changes that can be undone.
 _MAX_UNDO = 20
 #: A position nearer than this to a cut that was made has been cut (m).
@@ -153,8 +152,8 @@ class Perception:
         self._shifts: dict[str, Array] = {}
         """By how much the last close-up that showed a point was shifted against the map (m), by point."""
         self._undo: list[_RuleSnapshot] = []
-        self._severed: list[Array] = []
-        """Positions where wood was found cut."""
+        self._severed: list[Cut] = []
+        """Cuts that were found made."""
         self.camera_rays = CameraRays()
         self.plant_map = PlantMap()
         self.withdrawn: tuple[m.Reason, ...] = ()
@@ -216,7 +215,7 @@ class Perception:
             if self.row_frame.uncertain:
                 self._locate(view, labels)
             view = self.row_frame.in_map(view)
-            cylinders = self._obstacle_map.update(view, labels, apart=self._old_canes.capsules())
+            cylinders = self._obstacle_map.update(view, labels, apart=self._old_wood(view))
             self._apply(self._tracker.update(view, labels, []))
             self._update_obstacles(view, labels, cylinders, ())
             self._site_messages = (undecided_site(self._no_survey()),)
@@ -226,9 +225,10 @@ class Perception:
 
     def _process_unfamiliar(self, view: View, labels: Labels, reason: m.Reason) -> m.PruningPoints:
         """Points after a frame of doubtful classes or place: it adds obstacles, and removes and proposes nothing."""
-        cylinders = self._obstacle_map.update(view, labels, only_add=True, apart=self._old_canes.capsules())
+        old_wood = self._old_wood(view)
+        cylinders = self._obstacle_map.update(view, labels, only_add=True, apart=old_wood)
         canes = tuple(capsule for capsule in self._wood if capsule.kind == "cane")
-        wood = (cylinders + self._old_canes.capsules() + canes)[: self._config.obstacles.max_capsules]
+        wood = (cylinders + old_wood + canes)[: self._config.obstacles.max_capsules]
         self._wood = self._wood if wood == self._wood else wood
         self._unfamiliar_frames += 1
         if self._unfamiliar_frames < _UNFAMILIAR_FRAMES:
@@ -238,16 +238,16 @@ class Perception:
 
     def _survey(self, view: View, labels: Labels, plant: Plant) -> None:
         """Update plant map, points and obstacles from a survey frame and its plant, in map."""
-        cylinders = self._obstacle_map.update(view, labels, apart=self._old_canes.capsules())
         guyot, along = self._config.rule.system == "guyot", view.R[:, 0]
         if guyot:
-            plant = at_heads(plant, [each for each in cylinders if each.kind in ("trunk", "post")], along)
+            plant = at_heads(plant, [each for each in self._wood if each.kind in ("trunk", "post")], along)
         canes = self.plant_map.canes_above(_ABOVE_SPUR, self._config.tracker.min_hits, view.t, _CANES_NEAR)
         plant, numbers = self._numbering.numbered(plant, along, canes)
         spurs = self.plant_map.update(plant, numbers)
         old_canes = trace_old_canes(view, labels, self._config.skeleton) if guyot else []
         old_of = beside_spurs(old_canes, plant, numbers)
         self._old_canes.see(old_of)
+        cylinders = self._obstacle_map.update(view, labels, apart=self._old_wood(view))
         self._spur_pictures.add(view, plant, numbers)
         fused = {spur.number: spur.as_spur() for spur in self.plant_map.spurs} if self._config.fuse else {}
         keep_out = frame_keep_out(view, labels, self._wood, self._config.rule)
@@ -390,8 +390,9 @@ class Perception:
     def _with_distances(self, points: tuple[m.PruningPoint, ...]) -> tuple[m.PruningPoint, ...]:
         """The points with their distances to wires and cordons."""
         positions = np.array([point.position for point in points]).reshape(-1, 3)
+        wood = permanent(self._wood, self._config.rule)
         wires, cordons = (
-            [None if np.isinf(d) else d for d in CapsuleSet(permanent(self._wood), (kind,)).nearest(positions).tolist()]
+            [None if np.isinf(d) else d for d in CapsuleSet(wood, (kind,)).nearest(positions).tolist()]
             for kind in ("wire", "cordon")
         )
         return tuple(
@@ -472,11 +473,11 @@ class Perception:
         self._undo = [*self._undo, snapshot][-_MAX_UNDO:]
         self._config = replace(self._config, rule=rule)
         decisions = self._decide(rule)
+        proposals = self._by_rule(decisions, rule)
+        self._tracker.reset(proposals)
         self._undecided.clear()
         for spur, number, decision in decisions:
             self._update_undecided(number, spur, decision, in_front=False)
-        proposals = _proposals(decisions)
-        self._tracker.reset(proposals)
         self._retained_canes.select(self.plant_map.spurs, self._tracker.published_cuts(), rule)
         self._site_messages = self._undecided_sites()
         return _done(reasons.points_by_new_rule(len(proposals)))
@@ -487,7 +488,7 @@ class Perception:
         now = {point.point_id: point.digest for point in self._tracker.points()}
         tracker = self._tracker.copy()
         if rule != self._config.rule:
-            tracker.reset(_proposals(self._decide(rule)))
+            tracker.reset(self._by_rule(self._decide(rule), rule))
         then = {point.point_id: point.digest for point in tracker.points()}
         effect = m.RuleEffect(
             changed=tuple(name for name in now if name in then and then[name] != now[name]),
@@ -503,18 +504,21 @@ class Perception:
             return _refused(reasons.no_rule_before())
         before = self._undo.pop()
         self._config = replace(self._config, rule=before.rule)
-        cuts = self._severed[before.severed :]
-        self._tracker.restore(before.tracker, lambda number, position: self._is_standing(number, position, cuts))
+        made = self._severed[before.severed :]
+        self._tracker.restore(before.tracker, lambda number, position: self._is_standing(number, position, made))
         self._undecided, self._site_messages = before.undecided, before.undecided_sites
         self._retained_canes.select(self.plant_map.spurs, self._tracker.published_cuts(), before.rule)
         return _done(reasons.points_by_rule_before(len(self._tracker.points())))
 
-    def _is_standing(self, number: SpurNumber, position: Array, cuts: list[Array]) -> bool:
+    def _is_standing(self, number: SpurNumber, position: Array, cuts: list[Cut]) -> bool:
         """Whether none of some cuts was made at a position of a spur, or below it on the same cane."""
         for cut in cuts:
-            if distance(cut, position) < _SAME_CUT:
+            if distance(cut.position, position) < _SAME_CUT:
                 return False
-            here, there = self.plant_map.nearest_cane(position), self.plant_map.nearest_cane(cut)
+            if cut.kind == "removal":
+                # The map has no last year's cane; the nearest cane is another one.
+                continue
+            here, there = self.plant_map.nearest_cane(position), self.plant_map.nearest_cane(cut.position)
             if here is None or there is None or here[0].number != number:
                 continue
             if here[1] is there[1] and here[3] >= there[3]:
@@ -533,6 +537,14 @@ class Perception:
             decisions.append((spur, number, apply_rule(spur, rule, other_canes, keep_out, old_cane)))
         return decisions
 
+    def _by_rule(self, decisions: list[tuple[Spur, SpurNumber, Decision]], rule: RuleConfig) -> list[Proposal]:
+        """The cuts of a rule. A removal that has a point stays as it is, as no number of the rule is about it."""
+        stay = [each for each in self._tracker.published_cuts() if each.cut.kind == "removal"]
+        stay = stay if rule.system == "guyot" else []
+        known = {each.number for each in stay}
+        other = [each for each in _proposals(decisions) if each.cut.kind != "removal" or each.number not in known]
+        return [*stay, *other]
+
     def _update_undecided(
         self,
         number: SpurNumber,
@@ -541,9 +553,12 @@ class Perception:
         in_front: bool,
         unconfirmed: Collection[Site] = (),
     ) -> None:
-        # One picture hides what another one has shown.
-        shown = (number, "removal") in self._tracker.sites
-        causes = [each for each in decision.undecided if not (shown and each == _OLD_CANE_UNSEEN)]
+        # One picture hides what others have shown, and what has been cut off is not there.
+        settled = {kind for spur_number, kind in self._tracker.settled if spur_number == number}
+        if self._old_canes.is_severed(number):
+            settled.add("removal")
+        dropped, told = ({why for kind, why in decision.refused if (kind in settled) is done} for done in (True, False))
+        causes = [each for each in decision.undecided if each in told or each not in dropped]
         if any((number, cut.kind) in unconfirmed for cut in decision.cuts):
             causes.append(reasons.cut_unconfirmed())
         has_cuts = any(cut.kind not in _BESIDE_CANES for cut in decision.cuts)
@@ -555,21 +570,23 @@ class Perception:
 
     def _apply(self, update: TrackerUpdate) -> None:
         self.withdrawn += update.withdrawn
-        for position in update.severed:
-            if self._old_canes.sever(position):
-                self._severed.append(position)
+        for cut, number in ((each.cut, each.number) for each in update.severed):
+            self._severed.append(cut)
+            position = cut.position
+            if cut.kind == "removal":
+                self._obstacle_map.forget(self._old_canes.sever(number, position))
                 continue
             found = self.plant_map.nearest_cane(position)
             if found is not None:
                 self._spur_pictures.forget(found[0].number)
             self.plant_map.sever(position)
-            self._severed.append(position)
 
     def _update_obstacles(
         self, view: View, labels: Labels, cylinders: tuple[Capsule, ...], numbers: tuple[SpurNumber, ...]
     ) -> None:
         """Publish cylinders and the nearest retained canes; `numbers` are the spurs of this frame."""
-        obstacles, config = cylinders + self._old_canes.capsules(), self._config.obstacles
+        config = self._config.obstacles
+        obstacles = (cylinders + self._old_wood(view))[: config.max_capsules]
         if config.canes:
             seen = [spur for spur in self.plant_map.spurs if spur.number in numbers]
             room = max(0, config.max_capsules - len(obstacles))
@@ -577,6 +594,10 @@ class Perception:
             obstacles += self._retained_canes.update(view, labels, seen, cuts, self._config.rule, room)
         # Without news the object stays the same.
         self._wood = self._wood if obstacles == self._wood else obstacles
+
+    def _old_wood(self, view: View) -> tuple[Capsule, ...]:
+        """Last year's canes as obstacles; cordon-trained vines have none."""
+        return self._old_canes.capsules(view.t) if self._config.rule.system == "guyot" else ()
 
     def _is_survey(self, view: View, labels: Labels) -> bool:
         """Whether the cordon is seen from a distance at which whole spurs can be read."""

@@ -87,6 +87,10 @@ class ObstacleMap:
         distances = CapsuleSet(tuple(capsules)).distances(view.t[None])[0]
         return tuple(capsules[k] for k in np.sort(np.argsort(distances, kind="stable")[:most]).tolist())
 
+    def forget(self, wood: tuple[Capsule, ...]) -> None:
+        """Forget wood of class cordon that has fallen: until views refuted it, it would be in the way."""
+        self._grids["cordon"].forget(CapsuleSet(wood), _APART)
+
     def _capsules(self, kind: WoodClass, cells: OccupiedCells, plane: RowPlane) -> list[Capsule]:
         near = plane.near(cells.position, self._config.row_tolerance)
         if off_row := len(self._groups(kind, cells.position[~near])):

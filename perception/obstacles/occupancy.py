@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perception.arrays import Array, Index, Labels, Mask
+from perception.plant.capsules import CapsuleSet
 from perception.segmentation.frame import BACKGROUND, GROUND, View, class_pixels
 from rolling_panda.messages.types import WOOD_CLASSES, WoodClass
 
@@ -115,6 +116,12 @@ class OccupancyGrid:
         direction = direction / np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-9)
         variance = np.maximum(self._square[chosen] - position**2, 0.0)
         return OccupiedCells(position, variance, direction, self._weight[chosen])
+
+    def forget(self, wood: CapsuleSet, within: float) -> None:
+        """Forget the cells nearer than this to the surface of some wood (m)."""
+        if len(self._key):
+            self._odds[wood.nearest(self._position) < within] = 0.0
+            self._occupied &= self._odds > 0.0
 
     def _off_edges(self, depth: NDArray[np.float32], labels: Labels, rows: Index, cols: Index) -> Index:
         """Indices of pixels with neighbours of their class at their depth: edges have mixed depths."""

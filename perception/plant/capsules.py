@@ -3,13 +3,15 @@
 import numpy as np
 
 from perception.arrays import Array
+from perception.config import RuleConfig
 from rolling_panda.messages.perception import Capsule
 from rolling_panda.messages.types import WoodClass
 
 
-def permanent(capsules: tuple[Capsule, ...]) -> tuple[Capsule, ...]:
-    """Capsules without last year's canes of Guyot vines, which have the class of a cordon."""
-    return tuple(capsule for capsule in capsules if capsule.kind != "cordon" or capsule.spur < 0)
+def permanent(capsules: tuple[Capsule, ...], rule: RuleConfig) -> tuple[Capsule, ...]:
+    """Capsules without last year's canes, which have the class of a cordon and go where the rule is that of Guyot."""
+    guyot = rule.system == "guyot"
+    return tuple(capsule for capsule in capsules if not guyot or capsule.kind != "cordon" or capsule.spur < 0)
 
 
 class CapsuleSet:

@@ -133,7 +133,8 @@ def _wire_reason(rule: RuleConfig) -> Reason:
 
 
 def _wood_reason(obstacles: tuple[Capsule, ...], rule: RuleConfig) -> Callable[[Array], Reason | None]:
-    wood = {kind: CapsuleSet(permanent(obstacles), (kind,)) for kind in ("cordon", "trunk")}
+    stays = permanent(obstacles, rule)
+    wood = {kind: CapsuleSet(stays, (kind,)) for kind in ("cordon", "trunk")}
 
     def reason(position: Array) -> Reason | None:
         for kind, capsules in wood.items():

@@ -11,7 +11,7 @@ Nothing is extrapolated: nodes that were not seen are not counted.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from itertools import product
 from typing import Literal
@@ -95,18 +95,26 @@ class Cut:
 
 @dataclass(frozen=True)
 class Decision:
-    """Cuts of one spur, the reasons for what is left undecided, and the kinds of cut that these speak against."""
+    """The decision on one spur.
+
+    Attributes:
+        cuts: At most one of each kind.
+        undecided: The reasons for what is left undecided.
+        contradicted: Kinds of cut that these speak against.
+        refused: Why there is no cut of some kinds.
+    """
 
     cuts: tuple[Cut, ...] = ()
     undecided: tuple[Reason, ...] = ()
     contradicted: frozenset[CutKind] = frozenset()
+    refused: tuple[tuple[CutKind, Reason], ...] = field(default=(), compare=False)
 
     @classmethod
     def of(cls, results: dict[CutKind, Cut | Reason], undecided: tuple[Reason, ...]) -> "Decision":
         """From a cut of each kind or the reason why there is none, and the reasons that are told."""
         cuts = tuple(result for result in results.values() if isinstance(result, Cut))
-        refused = {kind: result for kind, result in results.items() if isinstance(result, Reason)}
-        return cls(cuts, undecided, frozenset(kind for kind, why in refused.items() if _speaks_against(why)))
+        refused = tuple((kind, result) for kind, result in results.items() if isinstance(result, Reason))
+        return cls(cuts, undecided, frozenset(kind for kind, why in refused if _speaks_against(why)), refused)
 
 
 def _speaks_against(reason: Reason) -> bool:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from perception.arrays import Array, distance
+from perception.plant.capsules import CapsuleSet
 from perception.plant.model import Cane, Plant, Spur
 from perception.plant.numbering import SpurNumber
 from rolling_panda.messages.perception import Capsule
@@ -21,8 +22,12 @@ _AT_HEAD, _OF_SPUR = 0.10, 0.15
 _BOW, _PIECE = 0.16, 0.08
 #: Observations before it is published, and by how much it is then seen elsewhere before it is published again (m).
 _MIN_OBSERVATIONS, _TOLERANCE = 3, 0.010
+#: The same of its radius (m).
+_RADIUS_TOLERANCE = 0.001
 #: A severed place is on it within this distance (m).
 _ON_CANE = 0.02
+#: So many are obstacles, those nearest to the camera: the message is as long in a long row.
+_MOST = 16
 
 
 def at_heads(plant: Plant, uprights: Sequence[Capsule], along: Array) -> Plant:
@@ -56,14 +61,25 @@ def beside_spurs(canes: Sequence[Cane], plant: Plant, numbers: Sequence[SpurNumb
 @dataclass
 class _Known:
     newest: Cane
-    observations: int = 1
-    published: Array | None = None
+    observations: int = 0
+    course: Array | None = None
+    """Corners of its first stretch as published (K×3, m, odom); None before."""
+    radius: float = 0.0
+    """As published (m)."""
 
-    @property
-    def course(self) -> Array:
-        """Corners of its first stretch (K×3, m, odom)."""
-        arcs = np.arange(0.0, min(_BOW, self.newest.length) + _PIECE / 2, _PIECE)
-        return np.array([self.newest.at(float(arc)) for arc in arcs])
+    def publish(self) -> None:
+        """Publish the newest observation if it is another one than the published one."""
+        arcs = np.arange(_PIECE, min(_BOW, self.newest.length) + _PIECE / 2, _PIECE)
+        # A hidden base goes straight on to the trunk.
+        new = np.array([self.newest.origin, *(self.newest.at(float(arc)) for arc in arcs)])
+        if self.course is not None:
+            # An end that this picture hides is where it was.
+            both = min(len(self.course), len(new))
+            same = np.linalg.norm(self.course[:both] - new[:both], axis=1).max() <= _TOLERANCE
+            if same and len(new) <= len(self.course) and abs(self.newest.radius - self.radius) <= _RADIUS_TOLERANCE:
+                return
+            new = np.concatenate([new, self.course[len(new) :]])
+        self.course, self.radius = new, self.newest.radius
 
 
 class OldCanes:
@@ -72,38 +88,56 @@ class OldCanes:
     def __init__(self) -> None:
         """Start without any."""
         self._known: dict[SpurNumber, _Known] = {}
+        self._severed: set[SpurNumber] = set()
 
     def see(self, canes: Mapping[SpurNumber, Cane]) -> None:
         """Add those of one frame."""
         for number, cane in canes.items():
-            known = self._known.setdefault(number, _Known(cane, 0))
+            known = self._known.setdefault(number, _Known(cane))
             known.newest, known.observations = cane, known.observations + 1
-            if known.observations < _MIN_OBSERVATIONS:
-                continue
-            old, new = known.published, known.course
-            if old is None or len(old) != len(new) or np.linalg.norm(old - new, axis=1).max() > _TOLERANCE:
-                known.published = new
+            if known.observations >= _MIN_OBSERVATIONS:
+                self._severed.discard(number)
+                known.publish()
 
     def newest(self, number: SpurNumber) -> Cane | None:
         """As it was seen last beside a spur; None where none is known."""
         known = self._known.get(number)
         return None if known is None else known.newest
 
-    def sever(self, position: Array) -> bool:
-        """Forget the one that was severed at a position (3, m, odom); whether one was there."""
-        for number, known in self._known.items():
-            if np.linalg.norm(known.newest.axis - position, axis=1).min() < _ON_CANE:
-                del self._known[number]
-                return True
-        return False
+    def sever(self, number: SpurNumber, position: Array) -> tuple[Capsule, ...]:
+        """Forget the one beside a spur that was severed at a position (3, m, odom).
 
-    def capsules(self) -> tuple[Capsule, ...]:
-        """Their first stretches in odom (m), each with the number of the spur beside it."""
-        out = []
-        for number, known in sorted(self._known.items()):
-            course, radius = known.published, known.newest.radius
-            if course is None:
-                continue
-            for start, end in zip(course, course[1:], strict=False):
-                out.append(Capsule("cordon", vector3(start), vector3(end), radius, radius, number.vine, number.spur))
-        return tuple(out)
+        Returns:
+            What fell, as far as the newest observation shows it; nothing where none is known there.
+        """
+        known = self._known.get(number)
+        if known is None:
+            return ()
+        # The place of the cut may be hidden in the newest observation.
+        whole = _capsules(number, np.array([known.newest.origin, *known.newest.axis]), known.newest.radius)
+        away = CapsuleSet(whole).distances(position[None])[0]
+        if away.min() >= _ON_CANE:
+            return ()
+        del self._known[number]
+        self._severed.add(number)
+        return whole[int(np.argmin(away)) :]
+
+    def is_severed(self, number: SpurNumber) -> bool:
+        """Whether the one beside a spur was severed, and none was seen there again."""
+        return number in self._severed
+
+    def capsules(self, camera: Array) -> tuple[Capsule, ...]:
+        """The first stretches of those nearest to the camera (3, m, odom), each with the number of its spur."""
+        found = [(number, known, known.course) for number, known in self._known.items() if known.course is not None]
+        nearest = sorted(found, key=lambda each: distance(each[2][0], camera))[:_MOST]
+        # In constant order, so that messages without news are equal.
+        in_order = sorted(nearest, key=lambda each: each[0])
+        return tuple(each for number, known, course in in_order for each in _capsules(number, course, known.radius))
+
+
+def _capsules(number: SpurNumber, course: Array, radius: float) -> tuple[Capsule, ...]:
+    """The pieces between the corners of a course (K×3, m, odom)."""
+    return tuple(
+        Capsule("cordon", vector3(start), vector3(end), radius, radius, number.vine, number.spur)
+        for start, end in zip(course, course[1:], strict=False)
+    )

@@ -57,10 +57,10 @@ class Proposal:
 
 @dataclass(frozen=True)
 class TrackerUpdate:
-    """Points withdrawn by a frame, with the reason, and positions where it showed wood cut (3, m, odom)."""
+    """Points withdrawn by a frame, with the reason, and the cuts that it showed made, at their mean positions."""
 
     withdrawn: tuple[m.Reason, ...]
-    severed: tuple[Array, ...]
+    severed: tuple[Proposal, ...]
 
 
 @dataclass
@@ -240,7 +240,7 @@ class Tracker:
                     withdrawn.append(self._withdraw_for_now(track, track.published))
                 continue
             if track.gone >= self._config.gone_frames:
-                severed.append(track.position)
+                severed.append(Proposal(dataclasses.replace(track.cut, position=track.position), track.number))
             if track.published is not None:
                 self._withdrawn[track.point_id] = track.published
                 withdrawn.append(reason)
@@ -338,9 +338,9 @@ class Tracker:
         )
 
     @property
-    def sites(self) -> set[Site]:
-        """Spurs and kinds of all cuts that were proposed, published or not."""
-        return {track.site for track in self._tracks}
+    def settled(self) -> set[Site]:
+        """Spurs and kinds of cuts that have a point, or had one that an operator moved."""
+        return {track.site for track in self._tracks if track.published is not None} | self._moved()
 
     def _start(self, proposal: Proposal) -> _Track:
         self._last_id += 1
@@ -407,7 +407,7 @@ class Tracker:
 
     def _publish(self, supported: list[_Track]) -> None:
         tracks = Counter(track.site for track in self._tracks)
-        published = {track.site for track in self._tracks if track.published is not None} | self._moved()
+        published = self.settled
         for track in self._tracks:
             if track.published is None:
                 sparse = self._looks[track.number].frames >= self._config.sparse_observations
@@ -421,8 +421,7 @@ class Tracker:
 
     def unconfirmed(self) -> set[Site]:
         """Spurs and kinds of cuts that were proposed, but not by enough frames and viewpoints for a point."""
-        published = {track.site for track in self._tracks if track.published is not None}
-        return self.sites - published - self._moved()
+        return {track.site for track in self._tracks} - self.settled
 
     def _moved(self) -> set[Site]:
         """Sites whose cut an operator has moved."""

@@ -43,8 +43,30 @@ def test_a_cut_past_the_next_node_leaves_too_many():
     assert told.right_cane and not told.right and told.nodes_left > 2
 
 
+def test_a_removal_is_right_on_the_stretch_beside_the_head_and_nowhere_else():
+    for truth in TRUTHS:
+        cut = truth.removal
+        for place in (cut.least, cut.best, cut.most):
+            told = judged(place, cut.tangent, "removal")
+            assert told.right and told.right_cane and (told.vine, told.kind) == (truth.vine, "removal")
+        assert judged(cut.best, cut.tangent, "removal").along_error == pytest.approx(0.0, abs=1e-9)
+        nearer = judged(cut.least - 0.005 * cut.tangent, cut.tangent, "removal")
+        assert nearer.right_cane and not nearer.right
+        beyond = judged(cut.most + 0.005 * cut.tangent, cut.tangent, "removal")
+        assert not beyond.right, "the first shoot would stay"
+        # The next rod of the same old cane, a cane of the spur, and a spur cut at the right place.
+        following = next(rod for _, rod in ROW.standing() if rod.parent == cut.rod and rod.last_years)
+        for place, tangent, kind in (
+            (following.at(0.5)[0], following.end - following.start, "removal"),
+            (truth.spur_cut.best, truth.spur_cut.tangent, "removal"),
+            (cut.best, cut.tangent, "spur cut"),
+        ):
+            other = judged(place, tangent / np.linalg.norm(tangent), kind)
+            assert not other.right_cane and not other.right and other.along_error is None
+
+
 def test_what_nobody_has_seen_is_hidden_and_counted_all_the_same():
     seen = GuyotJudge(ROW, 11)
     assert len(seen.spurs()) >= 2 * len(TRUTHS)
     assert {seen.visibility(*place) for place in seen.spurs()} == {"hidden"}
-    assert np.all([seen.kind(number) in ("spur cut", "cane cut") for _, number in seen.spurs()])
+    assert {seen.kind(number) for _, number in seen.spurs()} == {"spur cut", "cane cut", "removal"}

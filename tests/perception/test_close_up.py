@@ -13,7 +13,7 @@ from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
 from bridge.sim.vineyard.row import Row
-from bridge.sim.vineyard.truth import RightCut, judge
+from bridge.sim.vineyard.truth import RightCut, judge, judge_guyot
 from controller.work.posture_search import cut_poses
 from perception.config import PerceptionConfig
 from perception.plant.map import NOTHING_KNOWN, Surroundings
@@ -241,6 +241,45 @@ def test_a_cane_whose_depth_is_lost_beyond_the_cut_is_not_taken_for_one_that_is_
         assert z > 0.0 and seen.finding == "unseen" and seen.reason.code in ("beyond_cut_hidden", "no_cane_at_place"), (
             seen
         )
+
+
+@dataclass(frozen=True)
+class OldCane:
+    """A Guyot row, the removal of its last year's cane, and what the camera sees before it."""
+
+    row: Row
+    cut: RightCut
+    view: View
+
+    def point(self, aside: float = 0.0) -> m.PruningPoint:
+        return msgspec.structs.replace(point(self.cut, aside), kind="removal", offset=None, radius=0.007)
+
+
+@pytest.fixture(scope="module", params=[3, 11])
+def old(request: pytest.FixtureRequest) -> OldCane:
+    row = grow(VineyardConfig(vines=1, training="guyot"), request.param)
+    cut = judge_guyot(row)[0].removal
+    return OldCane(row, cut, view_from_clear(row, cut))
+
+
+@pytest.mark.parametrize("kind", ["cordon", "trunk", "spur", "cane", "node", "old cut"])
+def test_last_years_cane_is_seen_where_it_stands_whatever_wood_the_network_takes_it_for(
+    old: OldCane, kind: m.WoodClass
+) -> None:
+    labels = old.view.labels
+    assert labels is not None
+    classes = [m.WOOD_CLASSES.index(each) for each in ("cordon", kind)]
+    taken = replace(old.view, labels=np.where(labels == classes[0], np.uint8(classes[1]), labels))
+    seen = look(taken, old.point(aside=0.003))
+    assert seen.finding == "seen" and seen.position is not None, seen
+    off = np.array(seen.position) - old.cut.best
+    assert float(np.linalg.norm(off - old.cut.tangent * (off @ old.cut.tangent))) < 0.0025
+
+
+def test_last_years_cane_that_was_cut_off_is_seen_to_be_gone(old: OldCane) -> None:
+    assert look(view_from_clear(without(old.row, old.cut), old.cut), old.point()).finding == "severed"
+    # A spur cut there looks for a cane, and last year's is none.
+    assert look(old.view, point(old.cut)).finding != "seen"
 
 
 def test_from_too_far_or_out_of_the_picture_it_says_nothing_and_why(scene: Scene) -> None:

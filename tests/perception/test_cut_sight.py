@@ -11,7 +11,7 @@ from bridge.sim.camera.renderer import Camera
 from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.grow import grow
 from bridge.sim.vineyard.row import Row
-from bridge.sim.vineyard.truth import RightCut, judge
+from bridge.sim.vineyard.truth import RightCut, judge, judge_guyot
 from controller.work.posture_search import cut_poses
 from perception.config import PerceptionConfig
 from perception.segmentation.frame import View, decode_frame
@@ -20,6 +20,7 @@ from perception.tracking.cut_sight import CutFollower
 from rolling_panda import messages as m
 from rolling_panda import reasons
 from rolling_panda.messages.perception import CloseUpResult, CutSight
+from rolling_panda.messages.types import CutKind
 from rolling_panda.model.wire_values import vector3
 from tests.support.cameras import BASE, MODEL, POSTURE, T_TOOL_CAMERA
 
@@ -45,7 +46,7 @@ def sideways(cut: RightCut) -> np.ndarray:
     return side / np.linalg.norm(side)
 
 
-def following(cut: RightCut, aside: float = 0.0) -> CutFollower:
+def following(cut: RightCut, aside: float = 0.0, kind: CutKind = "spur cut") -> CutFollower:
     """After a close-up, at 1 s, that has seen a cut a little aside of where its cane is now."""
     follower = CutFollower(CONFIG)
     place = vector3(cut.best + aside * sideways(cut))
@@ -57,7 +58,7 @@ def following(cut: RightCut, aside: float = 0.0) -> CutFollower:
         position=place,
         tangent=vector3(cut.tangent),
     )
-    follower.begin(check, kind="spur cut")
+    follower.begin(check, kind)
     return follower
 
 
@@ -134,6 +135,18 @@ def test_a_cane_that_is_hidden_or_gone_is_not_made_up() -> None:
     seen = view(cut, 0.12)
     hidden = look(following(cut), replace(seen, depth=np.full_like(seen.depth, 0.2), labels=np.zeros_like(seen.labels)))
     assert hidden.position is None and hidden.reason == reasons.no_cane_at_place()
+
+
+@pytest.mark.parametrize("kind", ["cordon", "spur", "old cut"])
+def test_last_years_cane_is_followed_whatever_wood_it_is_taken_for(kind: m.WoodClass) -> None:
+    row = grow(VineyardConfig(vines=1, training="guyot"), 11)
+    cut = judge_guyot(row)[0].removal
+    seen = view(cut, 0.12, row, stamp=1.2)
+    assert seen.labels is not None
+    classes = [m.WOOD_CLASSES.index(each) for each in ("cordon", kind)]
+    taken = replace(seen, labels=np.where(seen.labels == classes[0], np.uint8(classes[1]), seen.labels))
+    assert off(look(following(cut, 0.005, "removal"), taken), cut) < 0.002
+    assert look(following(cut, 0.005), taken).position is None, "that of a spur cut is a cane"
 
 
 def test_what_no_close_up_has_seen_is_not_followed() -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace as replace_message
 
 from controller.config import HierarchyConfig
 from controller.whole_body.collision_geometry import _TOOL_CAPSULES, BLADES
@@ -73,6 +74,15 @@ def test_what_was_seen_before_keeps_the_blades_out_too(kind: m.WoodClass) -> Non
         rod = Capsule(kind, (-1.0, 0.01 + gap, 0.8), (1.0, 0.01 + gap, 0.8), 0.01, 0.01)
         assert bool(map_keep_out((rod,), RULE).reason(CUT)) is near, f"{kind} at {gap} m"
     assert map_keep_out((), RULE).reason(CUT) is None
+
+
+def test_last_years_cane_goes_itself_and_keeps_nothing_out_but_by_the_spur_rule() -> None:
+    old = Capsule("cordon", (-1.0, 0.02, 0.8), (1.0, 0.02, 0.8), 0.007, 0.007, vine=1, spur=1)
+    guyot = replace_message(RULE, system="guyot")
+    assert map_keep_out((old,), guyot).reason(CUT) is None
+    for stays, rule in ((old, RULE), (replace_message(old, vine=-1, spur=-1), guyot)):
+        reason = map_keep_out((stays,), rule).reason(CUT)
+        assert reason is not None and dict(reason.values)["kind"] == "cordon"
 
 
 @pytest.mark.parametrize(("lean", "fits"), [(0.0, True), (25.0, False), (-25.0, False)])

@@ -116,6 +116,30 @@ def test_while_a_joint_is_jogged_nothing_is_taken_for_cut_or_left_open():
     assert told[5][0] and all(each == told[5] for each in told[6:])
 
 
+@pytest.mark.long
+def test_wood_that_is_known_otherwise_is_no_part_of_the_map_and_what_has_fallen_is_forgotten():
+    model, row, camera = RobotModel(), grow(VineyardConfig(), 1), Camera(CameraConfig(), 1)
+    known, views = ObstacleMap(ObstacleConfig()), []
+    for k in range(4):
+        views.append(decode_frame(survey_frame(camera, row, model, k), model))
+        whole = known.update(views[-1], views[-1].labels)
+    other = max((each for each in whole if each.kind == "cordon"), key=lambda each: math.dist(each.start, each.end))
+    middle = (np.array(other.start) + np.array(other.end)) / 2
+
+    def nearest(capsules):
+        ends = [(np.array(each.start), np.array(each.end)) for each in capsules if each.kind == "cordon"]
+        return min(distance(middle, *each) for each in ends)
+
+    assert nearest(whole) < 0.005
+    apart = known.update(views[-1], views[-1].labels, apart=(other,))
+    assert nearest(apart) > 0.04
+    assert sum(each.kind == "wire" for each in apart) == sum(each.kind == "wire" for each in whole)
+    assert nearest(known.update(views[-1], views[-1].labels)) < 0.01
+    known.forget((other,))
+    blank = np.zeros_like(views[-1].labels)
+    assert nearest(known.update(views[-1], blank, only_add=True)) > 0.04
+
+
 def test_nothing_seen_is_nothing_known():
     assert ObstacleMap(ObstacleConfig()).update(blank_view(), np.zeros((48, 64), dtype=np.uint8)) == ()
 

@@ -7,8 +7,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from perception.segmentation.frame import BACKGROUND, CORDON, POST, TRUNK, View
-from perception.skeleton.fragments import CANE
+from perception.segmentation.frame import (
+    BACKGROUND,
+    CANE,
+    CORDON,
+    HOSE,
+    NODE,
+    OLD_CUT,
+    POST,
+    SPUR,
+    TRUNK,
+    WIRE,
+    View,
+)
 from perception.tracking.presence import wood_presence
 from rolling_panda.messages.robot import Intrinsics
 
@@ -44,6 +55,22 @@ def view(behind=3.0, cane_depth=0.8, cols=slice(78, 83), kind=BACKGROUND):
 )
 def test_wood_is_there_or_not_or_the_place_cannot_be_seen(seen, place, said):
     assert wood_presence(seen, seen.labels, place) == [said]
+
+
+@pytest.mark.parametrize("kind", [TRUNK, CORDON, SPUR, CANE, NODE, OLD_CUT])
+def test_last_years_cane_is_there_whatever_class_of_wood_a_picture_gives_it(kind):
+    seen = view()
+    labels = np.where(seen.labels == CANE, np.uint8(kind), seen.labels)
+    assert wood_presence(seen, labels, AT, kind="removal") == ["present"]
+    own = kind in (SPUR, CANE, NODE)
+    assert wood_presence(seen, labels, AT) == (["present"] if own else wood_presence(seen, 0 * labels, AT))
+
+
+@pytest.mark.parametrize("kind", [BACKGROUND, POST, WIRE, HOSE])
+def test_what_is_no_wood_of_a_vine_is_no_last_years_cane(kind):
+    seen = view()
+    assert wood_presence(seen, np.full_like(seen.labels, kind), AT, kind="removal") != ["present"]
+    assert wood_presence(view(cane_depth=0.9), seen.labels, AT, kind="removal") == ["gone"]
 
 
 @given(x=st.floats(-2, 2), y=st.floats(-2, 2), z=st.floats(-2, 3))
