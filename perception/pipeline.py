@@ -82,6 +82,7 @@ _CANES_NEAR = 2.0
 _UNFAMILIAR_FRAMES = 2
 #: Kinds of cuts that are on no cane that stays.
 _BESIDE_CANES = ("renewal cut", "removal")
+_OLD_CANE_UNSEEN = reasons.old_cane_unseen()
 #: Rule changes that can be undone.
 _MAX_UNDO = 20
 #: A position nearer than this to a cut that was made has been cut (m).
@@ -553,15 +554,21 @@ class Perception:
         in_front: bool,
         unconfirmed: Collection[Site] = (),
     ) -> None:
-        # One picture hides what others have shown, and what has been cut off is not there.
-        settled = {kind for spur_number, kind in self._tracker.settled if spur_number == number}
-        if self._old_canes.is_severed(number):
-            settled.add("removal")
-        dropped, told = ({why for kind, why in decision.refused if (kind in settled) is done} for done in (True, False))
-        causes = [each for each in decision.undecided if each in told or each not in dropped]
+        # One picture hides what others have shown.
+        settled = {kind for site, kind in self._tracker.settled if site == number}
+        lacking = {why for kind, why in decision.refused if kind not in settled}
+        dropped = {why for kind, why in decision.refused if kind in settled} - lacking
+        # A vine has one cane of last year: it may be beside another spur of its head, or cut off.
+        removals = {site.vine for site, kind in self._tracker.settled if kind == "removal"}
+        if number.vine in removals or self._old_canes.is_severed(number.vine):
+            dropped.add(_OLD_CANE_UNSEEN)
+            lacking.discard(_OLD_CANE_UNSEEN)
+        causes = [each for each in decision.undecided if each not in dropped]
         if any((number, cut.kind) in unconfirmed for cut in decision.cuts):
             causes.append(reasons.cut_unconfirmed())
         has_cuts = any(cut.kind not in _BESIDE_CANES for cut in decision.cuts)
+        # Of two canes one has its point, and the other one lacks it.
+        has_cuts |= bool(lacking) and not settled.isdisjoint(("spur cut", "cane cut"))
         self._undecided.update(number, has_cuts, causes, vector3(spur.position), in_front)
 
     def _undecided_sites(self) -> tuple[m.UndecidedSite, ...]:

@@ -193,7 +193,8 @@ def _prune_guyot(
     results: dict[CutKind, Cut | Reason] = {"removal": _remove(old_cane, [*own, *others], config, keep_out)}
     canes = _two_canes(spur, config)
     if isinstance(canes, Reason):
-        return Decision.of(results, (canes, *_refusals(results)))
+        undecided = canes, *_refusals(results)
+        return Decision.of({**results, "spur cut": canes, "cane cut": canes}, undecided)
     lower, upper = canes
     fruiting = replace(config, nodes_kept=config.fruiting_nodes)
     results["spur cut"] = _shorten(_Keeper(lower, "lower", 2), [upper.axis, *others], config, keep_out)

@@ -122,9 +122,9 @@ class OldCanes:
         self._severed.add(number)
         return whole[int(np.argmin(away)) :]
 
-    def is_severed(self, number: SpurNumber) -> bool:
-        """Whether the one beside a spur was severed, and none was seen there again."""
-        return number in self._severed
+    def is_severed(self, vine: int) -> bool:
+        """Whether that of a vine was severed, and none was seen there again."""
+        return any(number.vine == vine for number in self._severed)
 
     def capsules(self, camera: Array) -> tuple[Capsule, ...]:
         """The first stretches of those nearest to the camera (3, m, odom), each with the number of its spur."""

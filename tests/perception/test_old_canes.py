@@ -1,6 +1,8 @@
 """Last year's canes of Guyot vines: where they are, what is beside them, and what becomes of their removal."""
 
+import dataclasses
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +19,7 @@ from perception.config import PerceptionConfig, RuleConfig
 from perception.pipeline import Perception
 from perception.plant.model import Cane, Plant, Spur
 from perception.plant.numbering import SpurNumber
+from perception.rules.pruning import Decision, apply_rule
 from perception.segmentation.frame import decode_frame
 from perception.segmentation.segmenter import LabelImageSegmenter
 from perception.skeleton.topology import trace_old_canes
@@ -69,7 +72,8 @@ def test_a_post_may_hide_the_trunk_of_a_head_and_without_either_there_is_none() 
 def test_last_years_cane_is_beside_the_nearest_spur_within_reach_and_each_has_one() -> None:
     seen, numbers = plant(spur(0.5), spur(2.3)), (FIRST, SECOND)
     near, nearer, far = cane(0.56), cane(0.53), cane(1.3)
-    found = beside_spurs([near, nearer, far], seen, numbers)
+    assert beside_spurs([far], seen, numbers) == {}
+    found = beside_spurs([nearer, near, far], seen, numbers)
     assert found.keys() == {FIRST} and found[FIRST] is nearer
     both = beside_spurs([nearer, cane(2.35)], seen, numbers)
     assert both.keys() == {FIRST, SECOND}
@@ -116,11 +120,11 @@ def test_the_one_that_is_severed_is_forgotten_and_the_next_vines_stays() -> None
     assert fallen[-1].end == pytest.approx(cane(0.5).axis[-1])
     assert canes.newest(FIRST) is None and canes.newest(SECOND) is not None
     assert {each.vine for each in canes.capsules(CAMERA)} == {2}
-    assert canes.is_severed(FIRST) and not canes.is_severed(SECOND)
+    assert canes.is_severed(1) and not canes.is_severed(2)
     for _ in range(3):
-        assert canes.is_severed(FIRST), "one look may be mistaken"
+        assert canes.is_severed(1), "one look may be mistaken"
         canes.see({FIRST: cane(0.5)})
-    assert not canes.is_severed(FIRST)
+    assert not canes.is_severed(1)
 
 
 def test_in_a_long_row_only_the_nearest_are_obstacles() -> None:
@@ -290,6 +294,42 @@ def test_what_one_picture_lacks_is_not_left_open_where_others_gave_a_point(scene
     assert [site.reason.code for site in result.undecided_sites if site.vine == 1] == []
 
 
+def test_a_cane_that_lacks_its_cut_is_open_though_the_other_one_has_its_point(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lacking, hidden, alike = reasons.nodes_lacking(6, 8), reasons.cut_place_hidden(), reasons.canes_at_same_height()
+
+    def without_cane_cut(*arguments: Any) -> Decision:
+        others = {cut.kind: cut for cut in apply_rule(*arguments).cuts if cut.kind != "cane cut"}
+        return Decision.of({**others, "cane cut": lacking}, (lacking,))
+
+    monkeypatch.setattr("perception.pipeline.apply_rule", without_cane_cut)
+    seen = after(scene)
+    assert {each.kind for each in seen.points().points if each.vine == 1} == {"spur cut", "removal"}
+    for short, long, told in ((hidden, lacking, lacking), (alike, alike, alike)):
+        refused = Decision.of({"spur cut": short, "cane cut": long}, tuple(dict.fromkeys((short, long))))
+        monkeypatch.setattr("perception.pipeline.apply_rule", lambda *_, refused=refused: refused)
+        result = seen.process(scene.frames[2])
+        assert [site.reason for site in result.undecided_sites if site.vine == 1] == [told]
+
+
+def test_a_second_spur_of_a_head_does_not_ask_for_a_second_cane_of_last_year(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen = after(scene)
+    head = float(scene.truth.removal.least[0])
+
+    def with_another(*arguments: Any) -> Plant:
+        heads = at_heads(*arguments)
+        return dataclasses.replace(heads, spurs=(*heads.spurs, spur(head + 0.07, cane(head + 0.07, 0.7))))
+
+    monkeypatch.setattr("perception.pipeline.at_heads", with_another)
+    for frame in scene.frames[1:4]:
+        result = seen.process(frame)
+    told = [(site.spur, site.reason) for site in result.undecided_sites if site.vine == 1]
+    assert told == [(2, reasons.not_two_canes(1))]
+
+
 def severed(scene: Scene, at: m.Vector3) -> Row:
     """The row with the first vine's last year's cane cut off at a place."""
     rod = scene.row.rods[scene.truth.removal.rod]
@@ -298,6 +338,7 @@ def severed(scene: Scene, at: m.Vector3) -> Row:
     return scene.row.sever(scene.truth.removal.rod, float((np.array(at) - rod.start) @ span / (span @ span)))
 
 
+@pytest.mark.long
 def test_once_it_is_cut_off_it_is_no_obstacle_and_nobody_is_asked_for_it_again(scene: Scene) -> None:
     seen = after(scene)
     point = removal(seen)

@@ -436,6 +436,7 @@ def test_a_cane_that_leaves_the_view_too_early_is_not_tipped():
 def test_anything_but_two_canes_is_left_for_a_person(canes):
     decision = apply_rule(guyot_spur(*canes), GUYOT)
     assert not decision.cuts and decision.undecided == (reasons.not_two_canes(len(canes)), reasons.old_cane_unseen())
+    assert {kind for kind, why in decision.refused if why == decision.undecided[0]} == {"spur cut", "cane cut"}
 
 
 def test_doubts_end_in_no_cut():
