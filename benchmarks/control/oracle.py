@@ -7,6 +7,7 @@ The whole stretch where the removal of last year's cane of a Guyot vine is right
 """
 
 import dataclasses
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -122,6 +123,7 @@ def point_of(row: Row, wanted: WantedCut, cut: RightCut, guyot: bool = False) ->
     staying = next(each.cane for each in own if each.cane >= 0)
     removal = wanted.kind == "removal"
     kept = FRUITING_NODES if wanted.kind == "cane cut" else KEPT_NODES
+    farthest = math.inf if wanted.kind == "cane cut" else OUTWARD
     point = m.PruningPoint(
         point_id="truth",
         revision=1,
@@ -137,7 +139,7 @@ def point_of(row: Row, wanted: WantedCut, cut: RightCut, guyot: bool = False) ->
         kind=wanted.kind,
         cane=staying if wanted.cane == STUB else max(wanted.cane, -1),
         inward=0.0 if removal else min(INWARD, -cut.past_best(cut.least)),
-        outward=0.0 if removal else min(OUTWARD, cut.past_best(cut.most)),
+        outward=0.0 if removal else min(farthest, cut.past_best(cut.most)),
     )
     return replace(point, digest=point_digest(point))
 

@@ -38,6 +38,8 @@ _DOUBTFUL = 0.5
 #: Largest shift of a cut from its best place towards the last kept node, and away from it (m), where the blades have no
 #: room. With an offset of 20 mm the cut stays 10 to 30 mm past the node, also if its place is off by 3 mm.
 INWARD, OUTWARD = 0.005, 0.007
+#: A fruiting cane may be cut up to so near to the node past those that it keeps (m).
+_BEFORE_NEXT = 0.022
 #: Spacing of places that are looked at for that (m).
 _PLACE_STEP = 0.001
 #: Turns, tilts and leans of the blades in a renewal cut, as shares of the largest.
@@ -414,6 +416,8 @@ def _shorten(
             return False
         return _obstructed(cane.at(place), others, config, keep_out) is None
 
+    # A fruiting cane is tied along the wire: the stub past its last node may be as long as the internode.
+    farthest = max(nodes[kept].arc - _BEFORE_NEXT - best, OUTWARD) if fruiting and len(nodes) > kept else OUTWARD
     return Cut(
         kind="cane cut" if fruiting else "spur cut",
         position=cane.at(arc),
@@ -427,7 +431,7 @@ def _shorten(
         node_distance=node_distance(cane, nodes[:kept], cane.at(arc)),
         cane=cane.number,
         inward=_free(arc - (best - INWARD), lambda shift: allowed(arc - shift)),
-        outward=_free(best + OUTWARD - arc, lambda shift: allowed(arc + shift)),
+        outward=_free(best + farthest - arc, lambda shift: allowed(arc + shift)),
     )
 
 
