@@ -19,7 +19,7 @@ from perception.plant.capsules import CapsuleSet, permanent
 from perception.plant.map import PlantMap
 from perception.plant.model import Plant, Spur
 from perception.plant.numbering import SpurNumber, SpurNumbering
-from perception.plant.undecided_sites import UndecidedSites, undecided_site
+from perception.plant.undecided_sites import BESIDE_CANES, UndecidedSites, undecided_site
 from perception.rules.keep_out import frame_keep_out, map_keep_out
 from perception.rules.manual import move_cut, place_cut
 from perception.rules.pruning import Decision, apply_rule
@@ -80,9 +80,6 @@ _ABOVE_SPUR = 0.04
 _CANES_NEAR = 2.0
 #: Successive unfamiliar frames after which the page says so: a single one would make the list of open places flicker.
 _UNFAMILIAR_FRAMES = 2
-#: Kinds of cuts that are on no cane that stays.
-_BESIDE_CANES = ("renewal cut", "removal")
-_OLD_CANE_UNSEEN = reasons.old_cane_unseen()
 #: Rule changes that can be undone.
 _MAX_UNDO = 20
 #: A position nearer than this to a cut that was made has been cut (m).
@@ -541,17 +538,14 @@ class Perception:
         in_front: bool,
         unconfirmed: Collection[Site] = (),
     ) -> None:
-        # One picture hides what another one has shown.
-        shown = (number, "removal") in self._tracker.sites
-        causes = [each for each in decision.undecided if not (shown and each == _OLD_CANE_UNSEEN)]
+        causes = [(decision.about(reason), reason) for reason in decision.undecided]
         if any((number, cut.kind) in unconfirmed for cut in decision.cuts):
-            causes.append(reasons.cut_unconfirmed())
-        has_cuts = any(cut.kind not in _BESIDE_CANES for cut in decision.cuts)
+            causes.append((frozenset(), reasons.cut_unconfirmed()))
+        has_cuts = any(cut.kind not in BESIDE_CANES for cut in decision.cuts)
         self._undecided.update(number, has_cuts, causes, vector3(spur.position), in_front)
 
     def _undecided_sites(self) -> tuple[m.UndecidedSite, ...]:
-        points = (point for point in self._tracker.points() if point.kind not in _BESIDE_CANES)
-        return self._undecided.remaining({SpurNumber(point.vine, point.spur) for point in points})
+        return self._undecided.remaining(self._tracker.points())
 
     def _apply(self, update: TrackerUpdate) -> None:
         self.withdrawn += update.withdrawn

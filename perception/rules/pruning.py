@@ -97,18 +97,27 @@ class Cut:
 
 @dataclass(frozen=True)
 class Decision:
-    """Cuts of one spur, the reasons for what is left undecided, and the kinds of cut that these speak against."""
+    """Cuts of one spur, the reasons for what is left undecided, and those why a kind of cut is not proposed."""
 
     cuts: tuple[Cut, ...] = ()
     undecided: tuple[Reason, ...] = ()
-    contradicted: frozenset[CutKind] = frozenset()
+    refused: tuple[tuple[CutKind, Reason], ...] = ()
+
+    @property
+    def contradicted(self) -> frozenset[CutKind]:
+        """The kinds of cut that it speaks against."""
+        return frozenset(kind for kind, why in self.refused if _speaks_against(why))
+
+    def about(self, reason: Reason) -> frozenset[CutKind]:
+        """The kinds of cut that a reason is against; none where it is about the whole spur."""
+        return frozenset(kind for kind, why in self.refused if why == reason)
 
     @classmethod
     def of(cls, results: dict[CutKind, Cut | Reason], undecided: tuple[Reason, ...]) -> "Decision":
         """From a cut of each kind or the reason why there is none, and the reasons that are told."""
         cuts = tuple(result for result in results.values() if isinstance(result, Cut))
-        refused = {kind: result for kind, result in results.items() if isinstance(result, Reason)}
-        return cls(cuts, undecided, frozenset(kind for kind, why in refused.items() if _speaks_against(why)))
+        refused = tuple((kind, result) for kind, result in results.items() if isinstance(result, Reason))
+        return cls(cuts, undecided, refused)
 
 
 def _speaks_against(reason: Reason) -> bool:

@@ -337,11 +337,6 @@ class Tracker:
             if t.published is not None
         )
 
-    @property
-    def sites(self) -> set[Site]:
-        """Spurs and kinds of all cuts that were proposed, published or not."""
-        return {track.site for track in self._tracks}
-
     def _start(self, proposal: Proposal) -> _Track:
         self._last_id += 1
         self._tracks.append(_Track.of(f"p{self._last_id}", proposal))
@@ -422,7 +417,7 @@ class Tracker:
     def unconfirmed(self) -> set[Site]:
         """Spurs and kinds of cuts that were proposed, but not by enough frames and viewpoints for a point."""
         published = {track.site for track in self._tracks if track.published is not None}
-        return self.sites - published - self._moved()
+        return {track.site for track in self._tracks} - published - self._moved()
 
     def _moved(self) -> set[Site]:
         """Sites whose cut an operator has moved."""
