@@ -1,7 +1,5 @@
 """What is left open is remembered per spur, with what it needs, until it is settled."""
 
-import msgspec
-
 from perception.plant.numbering import SpurNumber
 from perception.plant.undecided_sites import UndecidedSites, undecided_site
 from rolling_panda import reasons
@@ -16,7 +14,7 @@ def because(*told, against=()):
 
 
 def points(number, *kinds):
-    return [msgspec.structs.replace(point("p1"), vine=number.vine, spur=number.spur, kind=kind) for kind in kinds]
+    return [point("p1", (0.0, 0.0, 1.0), vine=number.vine, spur=number.spur, kind=kind) for kind in kinds]
 
 
 def test_a_reason_says_whether_another_look_may_help_or_only_a_person():
