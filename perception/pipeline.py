@@ -261,7 +261,7 @@ class Perception:
             aside = abs(float(along @ (spur.position - view.t)))
             self._update_undecided(number, spur, decision, aside < _IN_FRONT, unconfirmed)
         self._update_obstacles(view, labels, cylinders, numbers)
-        self._cane_lines = self.plant_map.cane_lines()
+        self._cane_lines = self.plant_map.cane_lines() + self._old_canes.lines()
         self._site_messages = self._undecided_sites()
 
     def check_close_up(self, frame: CameraFrame) -> CloseUpResult:
@@ -348,7 +348,7 @@ class Perception:
         """All points, undecided sites and canes; the pictures are brought up to date."""
         points = self._tracker.points()
         sites = [SpurNumber(site.vine, site.spur) for site in self._site_messages if site.vine > 0]
-        self.pictures = self._spur_pictures.update(points, sites, self.plant_map)
+        self.pictures = self._spur_pictures.update(points, sites, self.plant_map, self._old_canes.newest)
         return m.PruningPoints(
             header=m.Header(self._stamp, "map"),
             segmenter=self.segmenter.name,
@@ -526,7 +526,7 @@ class Perception:
         for number, spur in spurs.items():
             axes = [cane.axis for other in spurs.values() if other is not spur for cane in other.canes]
             other_canes = np.concatenate([np.zeros((0, 3)), *axes])
-            old_cane = self._old_canes.newest(number)
+            old_cane = self._old_canes.newest.get(number)
             decisions.append((spur, number, apply_rule(spur, rule, other_canes, keep_out, old_cane)))
         return decisions
 
