@@ -80,6 +80,8 @@ _ABOVE_SPUR = 0.04
 _CANES_NEAR = 2.0
 #: Successive unfamiliar frames after which the page says so: a single one would make the list of open places flicker.
 _UNFAMILIAR_FRAMES = 2
+#: Up to this arc length canes are to be seen, by training system (m).
+_REACH = {"spur": 0.2, "guyot": 0.9}
 #: Rule changes that can be undone.
 _MAX_UNDO = 20
 #: A position nearer than this to a cut that was made has been cut (m).
@@ -241,12 +243,14 @@ class Perception:
             plant = at_heads(plant, [each for each in cylinders if each.kind in ("trunk", "post")], along)
         canes = self.plant_map.canes_above(_ABOVE_SPUR, self._config.tracker.min_hits, view.t, _CANES_NEAR)
         plant, numbers = self._numbering.numbered(plant, along, canes)
-        spurs = self.plant_map.update(plant, numbers)
+        spurs = self.plant_map.update(plant, numbers, _REACH[self._config.rule.system])
         old_canes = trace_old_canes(view, labels, self._config.skeleton) if guyot else []
         old_of = beside_spurs(old_canes, plant, numbers)
         self._old_canes.see(old_of)
         self._spur_pictures.add(view, plant, numbers)
-        fused = {spur.number: spur.as_spur() for spur in self.plant_map.spurs} if self._config.fuse else {}
+        # Hardly any picture shows all the nodes of a cane that will fruit.
+        whole_canes = self._config.fuse or guyot
+        fused = {spur.number: spur.as_spur() for spur in self.plant_map.spurs} if whole_canes else {}
         keep_out = frame_keep_out(view, labels, self._wood, self._config.rule)
         decisions: list[tuple[Spur, SpurNumber, Decision]] = []
         contradicted: set[Site] = set()
