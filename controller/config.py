@@ -154,9 +154,11 @@ class WorkConfig(Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         home: Survey posture of the arm (rad), with the camera facing the row.
-        survey_far: Posture of the arm (rad) on a survey's way out over Guyot vines, with the camera 0.1 m farther from
-            the row and 0.05 m lower: a picture shows a vine from its head to its last cut.
-        survey_low: Posture of the arm (rad) on the way back over them, with the camera 0.2 m lower than at home.
+        survey_far: Posture of the arm (rad) on a survey's way out over Guyot vines, with the camera 0.3 m farther from
+            the row than at home and 0.05 m lower: from 0.55 m beside the row a picture shows a vine from its head to
+            its last cut.
+        survey_low: Posture of the arm (rad) on the way back over them, with the camera 0.2 m farther from the row and
+            0.2 m lower.
         folded: Posture of the arm folded over the base (rad), to drive far.
         reach: Initial posture of the search for a cut posture (rad), elbow aside, tool to the left.
         row_heading: Direction of the row in odom (rad); the base keeps parallel to it, the row on its left.
@@ -192,8 +194,8 @@ class WorkConfig(Struct, frozen=True, forbid_unknown_fields=True):
     """
 
     home: ArmPosture = (-0.2784, -0.1128, -0.0354, -2.0055, 1.6759, 1.2124, -0.269)
-    survey_far: ArmPosture = (-0.3784, 0.0391, -0.1413, -1.9381, 1.5749, 1.0121, -0.3504)
-    survey_low: ArmPosture = (-0.2815, 0.1009, -0.0383, -2.1963, 1.5214, 1.1917, -0.7025)
+    survey_far: ArmPosture = (-0.6406, 0.4434, -0.2267, -1.4197, 1.6581, 0.6788, -0.1891)
+    survey_low: ArmPosture = (-0.5114, 0.3681, -0.1862, -1.8314, 1.3691, 0.8589, -0.6466)
     folded: ArmPosture = (0.0, -1.2, 0.0, -2.6, 0.0, 1.9, 0.785)
     reach: ArmPosture = (-0.3, -1.2, 1.1, -1.7, 2.25, 2.4, 0.55)
     row_heading: float = 0.0

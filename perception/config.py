@@ -280,7 +280,8 @@ class PerceptionConfig(Struct, frozen=True, forbid_unknown_fields=True):
         weights: ONNX file of the network; empty for the one of `rolling-panda models use`, else the shipped one.
         threads: Threads of the network.
         localise: Whether wood that was seen before corrects the odometry; otherwise map and odom are one.
-        fuse: Whether the rule is applied to the map of a spur over all frames, or to each frame alone.
+        fuse: Whether the rule is applied to the map of a spur over all frames, or to each frame alone. That of Guyot
+            vines always is.
         rule: Pruning rule.
         skeleton: From pixels to canes.
         tracker: Pruning points over time.

@@ -19,7 +19,7 @@ from perception.plant.capsules import CapsuleSet, permanent
 from perception.plant.map import PlantMap
 from perception.plant.model import Plant, Spur
 from perception.plant.numbering import SpurNumber, SpurNumbering
-from perception.plant.undecided_sites import UndecidedSites, undecided_site
+from perception.plant.undecided_sites import BESIDE_CANES, UndecidedSites, undecided_site
 from perception.rules.keep_out import frame_keep_out, map_keep_out
 from perception.rules.manual import move_cut, place_cut
 from perception.rules.pruning import Cut, Decision, apply_rule
@@ -80,8 +80,8 @@ _ABOVE_SPUR = 0.04
 _CANES_NEAR = 2.0
 #: Successive unfamiliar frames after which the page says so: a single one would make the list of open places flicker.
 _UNFAMILIAR_FRAMES = 2
-#: Kinds of cuts that are on no cane that stays.
-_BESIDE_CANES = ("renewal cut", "removal")
+#: Up to this arc length canes are to be seen, by training system (m).
+_REACH = {"spur": 0.2, "guyot": 0.9}
 _OLD_CANE_UNSEEN = reasons.old_cane_unseen()
 #: Rule changes that can be undone.
 _MAX_UNDO = 20
@@ -244,13 +244,15 @@ class Perception:
             plant = at_heads(plant, [each for each in self._wood if each.kind in ("trunk", "post")], along)
         canes = self.plant_map.canes_above(_ABOVE_SPUR, self._config.tracker.min_hits, view.t, _CANES_NEAR)
         plant, numbers = self._numbering.numbered(plant, along, canes)
-        spurs = self.plant_map.update(plant, numbers)
+        spurs = self.plant_map.update(plant, numbers, _REACH[self._config.rule.system])
         old_canes = trace_old_canes(view, labels, self._config.skeleton) if guyot else []
         old_of = beside_spurs(old_canes, plant, numbers)
         self._old_canes.see(old_of)
         cylinders = self._obstacle_map.update(view, labels, apart=self._old_wood(view))
         self._spur_pictures.add(view, plant, numbers)
-        fused = {spur.number: spur.as_spur() for spur in self.plant_map.spurs} if self._config.fuse else {}
+        # Hardly any picture shows all the nodes of a cane that will fruit.
+        whole_canes = self._config.fuse or guyot
+        fused = {spur.number: spur.as_spur() for spur in self.plant_map.spurs} if whole_canes else {}
         keep_out = frame_keep_out(view, labels, self._wood, self._config.rule)
         decisions: list[tuple[Spur, SpurNumber, Decision]] = []
         contradicted: set[Site] = set()
@@ -265,7 +267,7 @@ class Perception:
             aside = abs(float(along @ (spur.position - view.t)))
             self._update_undecided(number, spur, decision, aside < _IN_FRONT, unconfirmed)
         self._update_obstacles(view, labels, cylinders, numbers)
-        self._cane_lines = self.plant_map.cane_lines()
+        self._cane_lines = self.plant_map.cane_lines() + self._old_canes.lines()
         self._site_messages = self._undecided_sites()
 
     def check_close_up(self, frame: CameraFrame) -> CloseUpResult:
@@ -352,7 +354,7 @@ class Perception:
         """All points, undecided sites and canes; the pictures are brought up to date."""
         points = self._tracker.points()
         sites = [SpurNumber(site.vine, site.spur) for site in self._site_messages if site.vine > 0]
-        self.pictures = self._spur_pictures.update(points, sites, self.plant_map)
+        self.pictures = self._spur_pictures.update(points, sites, self.plant_map, self._old_canes.newest)
         return m.PruningPoints(
             header=m.Header(self._stamp, "map"),
             segmenter=self.segmenter.name,
@@ -534,7 +536,7 @@ class Perception:
         for number, spur in spurs.items():
             axes = [cane.axis for other in spurs.values() if other is not spur for cane in other.canes]
             other_canes = np.concatenate([np.zeros((0, 3)), *axes])
-            old_cane = self._old_canes.newest(number)
+            old_cane = self._old_canes.newest.get(number)
             decisions.append((spur, number, apply_rule(spur, rule, other_canes, keep_out, old_cane)))
         return decisions
 
@@ -554,26 +556,21 @@ class Perception:
         in_front: bool,
         unconfirmed: Collection[Site] = (),
     ) -> None:
-        # One picture hides what others have shown.
+        causes = [(decision.about(reason), reason) for reason in decision.undecided]
+        # One picture hides what others have shown. Nor is what was told against a cut open once that cut is made.
         settled = {kind for site, kind in self._tracker.settled if site == number}
-        lacking = {why for kind, why in decision.refused if kind not in settled}
-        dropped = {why for kind, why in decision.refused if kind in settled} - lacking
+        causes = [(against, reason) for against, reason in causes if not against or against - settled]
         # A vine has one cane of last year: it may be beside another spur of its head, or cut off.
         removals = {site.vine for site, kind in self._tracker.settled if kind == "removal"}
         if number.vine in removals or self._old_canes.is_severed(number.vine):
-            dropped.add(_OLD_CANE_UNSEEN)
-            lacking.discard(_OLD_CANE_UNSEEN)
-        causes = [each for each in decision.undecided if each not in dropped]
+            causes = [each for each in causes if each[1] != _OLD_CANE_UNSEEN]
         if any((number, cut.kind) in unconfirmed for cut in decision.cuts):
-            causes.append(reasons.cut_unconfirmed())
-        has_cuts = any(cut.kind not in _BESIDE_CANES for cut in decision.cuts)
-        # Of two canes one has its point, and the other one lacks it.
-        has_cuts |= bool(lacking) and not settled.isdisjoint(("spur cut", "cane cut"))
+            causes.append((frozenset(), reasons.cut_unconfirmed()))
+        has_cuts = any(cut.kind not in BESIDE_CANES for cut in decision.cuts)
         self._undecided.update(number, has_cuts, causes, vector3(spur.position), in_front)
 
     def _undecided_sites(self) -> tuple[m.UndecidedSite, ...]:
-        points = (point for point in self._tracker.points() if point.kind not in _BESIDE_CANES)
-        return self._undecided.remaining({SpurNumber(point.vine, point.spur) for point in points})
+        return self._undecided.remaining(self._tracker.points())
 
     def _apply(self, update: TrackerUpdate) -> None:
         self.withdrawn += update.withdrawn

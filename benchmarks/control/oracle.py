@@ -7,6 +7,7 @@ The whole stretch where the removal of last year's cane of a Guyot vine is right
 """
 
 import dataclasses
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -18,7 +19,7 @@ from benchmarks.common.documents import bench_parser, write
 from benchmarks.common.intervals import Figure, share
 from benchmarks.control.cut_truth import STUB, WantedCut, wanted_cuts
 from benchmarks.perception.blocked import Blocker, blocked_by
-from bridge.sim.vineyard.config import VineyardConfig
+from bridge.sim.vineyard.config import GUYOT_ROW_DISTANCE, VineyardConfig
 from bridge.sim.vineyard.grow import grow
 from bridge.sim.vineyard.row import Row
 from bridge.sim.vineyard.truth import FRUITING_NODES, KEPT_NODES, RightCut, staying_rods
@@ -82,7 +83,8 @@ class Oracle:
         config = load_section(path, "controller", ControllerConfig)
         robot = load_section(path, "robot", RobotConfig)
         self._clearance = CutClearance(RobotModel(robot), config.whole_body.hierarchy)
-        self._search = PostureSearch(RobotModel(robot), config.work, config.whole_body.joint_margin, self._clearance)
+        work = replace(config.work, row_distance=GUYOT_ROW_DISTANCE) if guyot else config.work
+        self._search = PostureSearch(RobotModel(robot), work, config.whole_body.joint_margin, self._clearance)
         self._home = np.array(config.work.home)
 
     def search(self, row: Row, wanted: WantedCut, cut: RightCut) -> tuple[CutPlan | None, str]:
@@ -122,6 +124,7 @@ def point_of(row: Row, wanted: WantedCut, cut: RightCut, guyot: bool = False) ->
     staying = next(each.cane for each in own if each.cane >= 0)
     removal = wanted.kind == "removal"
     kept = FRUITING_NODES if wanted.kind == "cane cut" else KEPT_NODES
+    farthest = math.inf if wanted.kind == "cane cut" else OUTWARD
     point = m.PruningPoint(
         point_id="truth",
         revision=1,
@@ -137,7 +140,7 @@ def point_of(row: Row, wanted: WantedCut, cut: RightCut, guyot: bool = False) ->
         kind=wanted.kind,
         cane=staying if wanted.cane == STUB else max(wanted.cane, -1),
         inward=0.0 if removal else min(INWARD, -cut.past_best(cut.least)),
-        outward=0.0 if removal else min(OUTWARD, cut.past_best(cut.most)),
+        outward=0.0 if removal else min(farthest, cut.past_best(cut.most)),
     )
     return replace(point, digest=point_digest(point))
 
@@ -174,7 +177,10 @@ def cane_lines(row: Row) -> tuple[tuple[m.Vector3, ...], ...]:
 
 def look(oracle: Oracle, seed: int, vines: int, guyot: bool = False) -> list[Found]:
     """Every right cut of a grown row."""
-    row, found = grow(VineyardConfig(vines=vines, training="guyot" if guyot else "cordon"), seed), []
+    config, found = VineyardConfig(vines=vines), list[Found]()
+    if guyot:
+        config = replace(config, training="guyot", row_distance=GUYOT_ROW_DISTANCE)
+    row = grow(config, seed)
     for wanted in wanted_cuts(row, guyot):
         if (cut := wanted.cut) is None:
             continue

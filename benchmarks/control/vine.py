@@ -33,8 +33,8 @@ from benchmarks.peers.rows import PEERS, use_peers
 from benchmarks.perception.blocked import Blocker, blocked_by
 from benchmarks.perception.judge import nearest_rod
 from bridge.sim.robot import trace
+from bridge.sim.vineyard.config import GUYOT_ROW_DISTANCE, VineyardConfig
 from bridge.sim.vineyard.config import PRESETS as CULTIVARS
-from bridge.sim.vineyard.config import VineyardConfig
 from bridge.sim.vineyard.row import Row
 from bridge.sim.vineyard.truth import staying_rods
 from bridge.sim.world.config import PRESETS, WorldConfig
@@ -603,7 +603,12 @@ def one_vine(training: Training, length: float, cultivar: str) -> dict[str, dict
     row: dict[str, object] = {"preset": cultivar, "vines": 1, "first_vine_x": _CAMERA_AHEAD + length / 2}
     if training == "spur":
         return {"vineyard": row}
-    return {"vineyard": {**row, "training": "guyot"}, "perception.rule": {"system": "guyot"}}
+    beside: dict[str, object] = {"row_distance": GUYOT_ROW_DISTANCE}
+    return {
+        "vineyard": {**row, **beside, "training": "guyot"},
+        "controller.work": beside,
+        "perception.rule": {"system": "guyot"},
+    }
 
 
 def places(

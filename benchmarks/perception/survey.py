@@ -15,6 +15,7 @@ from typing import get_args
 
 import msgspec
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from benchmarks.common.documents import bench_parser, write
@@ -28,7 +29,7 @@ from benchmarks.perception.looks import CloseCamera, Looks, look_again, summaris
 from bridge.sim.camera.config import CameraConfig
 from bridge.sim.camera.frame import camera_frame, camera_pose, survey_place
 from bridge.sim.camera.renderer import Camera
-from bridge.sim.vineyard.config import VineyardConfig
+from bridge.sim.vineyard.config import GUYOT_ROW_DISTANCE, VineyardConfig
 from bridge.sim.vineyard.grow import grow
 from bridge.sim.world.config import CALM, PRESETS, WorldConfig, only
 from bridge.sim.world.growth import overgrown
@@ -102,7 +103,9 @@ def survey_row(
         world: Disturbances of row and camera.
     """
     guyot = perception.config.rule.system == "guyot"
-    config = VineyardConfig(vines=vines, training="guyot" if guyot else "cordon")
+    config = VineyardConfig(vines=vines)
+    if guyot:
+        config = replace(config, training="guyot", row_distance=GUYOT_ROW_DISTANCE)
     row = overgrown(grow(config, seed), world, seed)
     camera = Camera(camera_config, seed, world)
     opinion = GuyotJudge(row, seed) if guyot else RowJudge(row, seed)

@@ -153,6 +153,8 @@ _TURNS, _TILTS = (0.0, 0.35, 0.7), (0.0, 0.13, 0.26)
 _LEANS, _STUB_LEANS = (0.0, 0.13, 0.26, 0.4, 0.55), (0.0, 0.2, 0.4, 0.6, 0.8)
 #: Places of a cut along its wood in order of preference (m), as far as its point allows them.
 _ALONG = (0.0, 0.0025, -0.0025, 0.005, -0.005, 0.007)
+#: Farther places on the canes of a Guyot vine, where a long stub does no harm (m).
+_FARTHER = (0.015, 0.025, 0.04)
 #: An approach that differs from a tried one by this is another one (rad), and room beside a cane that was met which is
 #: enough (m): how far canes lean and swing, and what the map may err.
 _ANOTHER, _ENOUGH = 0.2, 0.03
@@ -194,7 +196,8 @@ def approaches(azimuth: float | None, kind: CutKind) -> tuple[Approach, ...]:
 
 def places(point: PruningPoint) -> tuple[float, ...]:
     """Where a cut may be made along its wood (m past the point), the point itself first."""
-    return tuple(along for along in _ALONG if -point.inward <= along <= point.outward)
+    steps = (*_ALONG, *_FARTHER) if point.kind in ("cane cut", "removal") else _ALONG
+    return tuple(along for along in steps if -point.inward <= along <= point.outward)
 
 
 def _approaches_of(tried: Sequence[Tried]) -> list[Approach]:

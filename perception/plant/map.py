@@ -33,6 +33,8 @@ _MIN_SHARE = 0.6
 _WINDOW = 20
 #: Stretches of a cane that are told apart by whether a frame has shown them (m), and how many there are.
 _STRETCH, _STRETCHES = 0.003, 500
+#: No observation of a cane up to this length is the most complete one (m).
+_SHORT = 0.2
 #: Number of points of a cane's line for display, and its smallest length (m).
 _LINE_POINTS, _MIN_LINE = 9, 0.02
 
@@ -116,8 +118,13 @@ class KnownCane:
         known.shown += _shown(cane)
         return known
 
-    def add(self, cane: Cane) -> Cane:
-        """Add an observation; returns it with arc lengths from the base of all."""
+    def add(self, cane: Cane, reach: float) -> Cane:
+        """Add an observation; returns it with arc lengths from the base of all.
+
+        Args:
+            cane: As one frame shows it.
+            reach: What is seen beyond this arc length makes it no more complete (m).
+        """
         offset = self._offset(cane)
         self.bases.append(offset)
         cane = cane.shifted(offset - self._move_base(round(float(np.median(self.bases)) / _STRETCH)))
@@ -125,7 +132,7 @@ class KnownCane:
         self.radii.append(cane.radius)
         self.shown += _shown(cane)
         self.base.add(cane.base)
-        if _unseen(cane) < _unseen(self.best) and cane.length > 0.2:
+        if cane.length > _SHORT and _unseen(cane, reach) < _unseen(self.best, reach):
             self.best = cane
         for node in cane.nodes:
             near = [known for known in self.nodes if abs(known.arc - node.arc) < _SAME_NODE]
@@ -211,7 +218,10 @@ class KnownCane:
         axis, arc = self.best.axis[stands], self.best.arc[stands]
         end = self.best.end if np.isinf(self.cut_at) else "free"
         radius = float(self.radius.mean[0])
-        return replace(self.best, axis=axis, arc=arc, nodes=nodes, radius=radius, end=end, number=self.number)
+        hidden = tuple(span for part in self.best.hidden for span in self._unseen_of(part))
+        return replace(
+            self.best, axis=axis, arc=arc, nodes=nodes, radius=radius, hidden=hidden, end=end, number=self.number
+        )
 
     def line(self) -> tuple[Vector3, ...]:
         """A few points of the standing axis for display (m, odom); empty where it is too short."""
@@ -297,7 +307,7 @@ class PlantMap:
         """Start with an unknown row."""
         self._spurs: dict[SpurNumber, KnownSpur] = {}
 
-    def update(self, plant: Plant, numbers: tuple[SpurNumber, ...]) -> tuple[Spur, ...]:
+    def update(self, plant: Plant, numbers: tuple[SpurNumber, ...], reach: float = _SHORT) -> tuple[Spur, ...]:
         """Add the plant of one frame; returns its spurs with the median stub, and their canes as all frames show them.
 
         They have the hidden canes that at least a third of the observations have shown.
@@ -305,6 +315,7 @@ class PlantMap:
         Args:
             plant: Plant of one frame.
             numbers: Of its spurs, in their order.
+            reach: Arc length up to which a cane is to be seen (m).
         """
         out = []
         for spur, number in zip(plant.spurs, numbers, strict=True):
@@ -315,7 +326,7 @@ class PlantMap:
                 known.position.add(spur.position)
                 if not spur.incomplete and (known.best.incomplete or len(spur.canes) > len(known.best.canes)):
                     known.best = spur
-            seen = _associate(known, spur.canes)
+            seen = _associate(known, spur.canes, reach)
             out.append(replace(known.with_median_stub(spur), canes=seen, hidden=known.hidden_canes(seen)))
         return tuple(out)
 
@@ -376,7 +387,7 @@ class PlantMap:
         return tuple(line for spur in self.spurs for cane in spur.canes if (line := cane.line()))
 
 
-def _associate(spur: KnownSpur, canes: tuple[Cane, ...]) -> tuple[Cane, ...]:
+def _associate(spur: KnownSpur, canes: tuple[Cane, ...], reach: float) -> tuple[Cane, ...]:
     """Add the canes of one frame to those that they are; returns them with what other frames have shown.
 
     A frame shows a cane once. So each goes to another one of the map, all of them together as near as they can be.
@@ -391,7 +402,7 @@ def _associate(spur: KnownSpur, canes: tuple[Cane, ...]) -> tuple[Cane, ...]:
             spur.canes.append(KnownCane.of(cane, len(spur.canes)))
             out.append(spur.canes[-1].with_other_views(cane))
         else:
-            out.append(known.with_other_views(known.add(cane)))
+            out.append(known.with_other_views(known.add(cane, reach)))
     return tuple(out)
 
 
@@ -416,6 +427,7 @@ def _shown(cane: Cane) -> NDArray[np.int64]:
     return shown
 
 
-def _unseen(cane: Cane) -> float:
-    """Length that was not seen (m)."""
-    return cane.base_gap + sum(span.end - span.start for span in cane.hidden)
+def _unseen(cane: Cane, reach: float) -> float:
+    """Length that was not seen, up to where it ends or is to be seen (m)."""
+    hidden = sum(span.end - span.start for span in cane.hidden)
+    return cane.base_gap + hidden + max(0.0, reach - cane.length)

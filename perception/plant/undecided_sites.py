@@ -1,5 +1,6 @@
 """Spurs without a pruning point: the reason, and whether another look may help or only an operator."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from msgspec.structs import replace
@@ -7,7 +8,10 @@ from msgspec.structs import replace
 from perception.plant.numbering import SpurNumber
 from rolling_panda import messages as m
 from rolling_panda import reasons
+from rolling_panda.messages.types import CutKind
 
+#: Kinds of cuts that are on no cane that stays.
+BESIDE_CANES: tuple[CutKind, ...] = ("renewal cut", "removal")
 #: Observations from the front after which another look is not expected to help.
 _MAX_OBSERVATIONS = 12
 #: Codes of the reasons that another look may resolve.
@@ -57,10 +61,14 @@ def undecided_site(
     )
 
 
+#: Why a spur is undecided, each with the kinds of cut that it is against; none where it is about the whole spur.
+Causes = Sequence[tuple[frozenset[CutKind], m.Reason]]
+
+
 @dataclass(frozen=True)
 class _Site:
     has_cuts: bool
-    messages: tuple[m.UndecidedSite, ...]
+    messages: tuple[tuple[frozenset[CutKind], m.UndecidedSite], ...]
     in_front: bool
 
 
@@ -94,14 +102,14 @@ class UndecidedSites:
             return False
         self._left.pop(number, None)
         if left:
-            self._left[number] = frozenset(_kind(each.reason) for each in site.messages)
+            self._left[number] = frozenset(_kind(each.reason) for _, each in site.messages)
         return True
 
     def update(
         self,
         number: SpurNumber,
         has_cuts: bool,
-        causes: list[m.Reason],
+        causes: Causes,
         position: m.Vector3 | None = None,
         in_front: bool = True,
     ) -> None:
@@ -110,7 +118,7 @@ class UndecidedSites:
         Args:
             number: Of the spur.
             has_cuts: Whether cuts of canes are proposed there as well.
-            causes: Why it is undecided; an empty list closes the site.
+            causes: Why it is undecided; without any the site is closed.
             position: Of the spur (m, odom).
             in_front: Whether the camera is in front of it. Other views do not overrule one from the front.
         """
@@ -120,16 +128,28 @@ class UndecidedSites:
         if not causes:
             self._sites.pop(number, None)
         elif in_front or known is None or not known.in_front:
-            messages = tuple(undecided_site(reason, number, position) for reason in causes)
+            messages = tuple((against, undecided_site(reason, number, position)) for against, reason in causes)
             self._sites[number] = _Site(has_cuts, messages, in_front)
 
-    def remaining(self, with_points: set[SpurNumber]) -> tuple[m.UndecidedSite, ...]:
-        """All reasons in order of the spurs; those without a cut are omitted for spurs where a cane has a point."""
+    def remaining(self, points: Iterable[m.PruningPoint]) -> tuple[m.UndecidedSite, ...]:
+        """All reasons in order of the spurs, without those that points have settled.
+
+        One picture may not show what others have shown: where a cut has a point, a reason against it is none. Where a
+        cane has a point, reasons about a whole spur without cuts are none either.
+
+        Args:
+            points: All published ones.
+        """
+        settled = {(SpurNumber(point.vine, point.spur), point.kind) for point in points}
+        with_points = {number for number, kind in settled if kind not in BESIDE_CANES}
+        # Of two canes one has its point, and the other one may lack it.
+        half_done = {number for number, kind in settled if kind in ("spur cut", "cane cut")}
         return tuple(
             self._with_need(each, number)
             for number, site in sorted(self._sites.items())
-            if site.has_cuts or number not in with_points
-            for each in site.messages
+            for against, each in site.messages
+            if site.has_cuts or number not in with_points or (against and number in half_done)
+            if not against or any((number, kind) not in settled for kind in against)
         )
 
     def _with_need(self, site: m.UndecidedSite, number: SpurNumber) -> m.UndecidedSite:

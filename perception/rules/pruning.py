@@ -11,7 +11,7 @@ Nothing is extrapolated: nodes that were not seen are not counted.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 from itertools import product
 from typing import Literal
@@ -38,6 +38,8 @@ _DOUBTFUL = 0.5
 #: Largest shift of a cut from its best place towards the last kept node, and away from it (m), where the blades have no
 #: room. With an offset of 20 mm the cut stays 10 to 30 mm past the node, also if its place is off by 3 mm.
 INWARD, OUTWARD = 0.005, 0.007
+#: A fruiting cane may be cut up to so near to the node past those that it keeps (m).
+_BEFORE_NEXT = 0.022
 #: Spacing of places that are looked at for that (m).
 _PLACE_STEP = 0.001
 #: Turns, tilts and leans of the blades in a renewal cut, as shares of the largest.
@@ -95,26 +97,27 @@ class Cut:
 
 @dataclass(frozen=True)
 class Decision:
-    """The decision on one spur.
-
-    Attributes:
-        cuts: At most one of each kind.
-        undecided: The reasons for what is left undecided.
-        contradicted: Kinds of cut that these speak against.
-        refused: Why there is no cut of some kinds.
-    """
+    """Cuts of one spur, the reasons for what is left undecided, and those why a kind of cut is not proposed."""
 
     cuts: tuple[Cut, ...] = ()
     undecided: tuple[Reason, ...] = ()
-    contradicted: frozenset[CutKind] = frozenset()
-    refused: tuple[tuple[CutKind, Reason], ...] = field(default=(), compare=False)
+    refused: tuple[tuple[CutKind, Reason], ...] = ()
+
+    @property
+    def contradicted(self) -> frozenset[CutKind]:
+        """The kinds of cut that it speaks against."""
+        return frozenset(kind for kind, why in self.refused if _speaks_against(why))
+
+    def about(self, reason: Reason) -> frozenset[CutKind]:
+        """The kinds of cut that a reason is against; none where it is about the whole spur."""
+        return frozenset(kind for kind, why in self.refused if why == reason)
 
     @classmethod
     def of(cls, results: dict[CutKind, Cut | Reason], undecided: tuple[Reason, ...]) -> "Decision":
         """From a cut of each kind or the reason why there is none, and the reasons that are told."""
         cuts = tuple(result for result in results.values() if isinstance(result, Cut))
         refused = tuple((kind, result) for kind, result in results.items() if isinstance(result, Reason))
-        return cls(cuts, undecided, frozenset(kind for kind, why in refused if _speaks_against(why)), refused)
+        return cls(cuts, undecided, refused)
 
 
 def _speaks_against(reason: Reason) -> bool:
@@ -423,6 +426,8 @@ def _shorten(
             return False
         return _obstructed(cane.at(place), others, config, keep_out) is None
 
+    # A fruiting cane is tied along the wire: the stub past its last node may be as long as the internode.
+    farthest = max(nodes[kept].arc - _BEFORE_NEXT - best, OUTWARD) if fruiting and len(nodes) > kept else OUTWARD
     return Cut(
         kind="cane cut" if fruiting else "spur cut",
         position=cane.at(arc),
@@ -436,7 +441,7 @@ def _shorten(
         node_distance=node_distance(cane, nodes[:kept], cane.at(arc)),
         cane=cane.number,
         inward=_free(arc - (best - INWARD), lambda shift: allowed(arc - shift)),
-        outward=_free(best + OUTWARD - arc, lambda shift: allowed(arc + shift)),
+        outward=_free(best + farthest - arc, lambda shift: allowed(arc + shift)),
     )
 
 

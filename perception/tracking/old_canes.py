@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from perception.arrays import Array, distance
+from perception.arrays import Array, distance, interpolate
 from perception.plant.capsules import CapsuleSet
 from perception.plant.model import Cane, Plant, Spur
 from perception.plant.numbering import SpurNumber
 from rolling_panda.messages.perception import Capsule
+from rolling_panda.messages.types import Vector3
 from rolling_panda.model.wire_values import vector3
 
 #: Spurs so near to a trunk along the row are at its head, and last year's cane begins so near to them (m).
@@ -24,6 +25,8 @@ _BOW, _PIECE = 0.16, 0.08
 _MIN_OBSERVATIONS, _TOLERANCE = 3, 0.010
 #: The same of its radius (m).
 _RADIUS_TOLERANCE = 0.001
+#: Points of its line on the page.
+_LINE_POINTS = 8
 #: A severed place is on it within this distance (m).
 _ON_CANE = 0.02
 #: So many are obstacles, those nearest to the camera: the message is as long in a long row.
@@ -99,10 +102,16 @@ class OldCanes:
                 self._severed.discard(number)
                 known.publish()
 
-    def newest(self, number: SpurNumber) -> Cane | None:
-        """As it was seen last beside a spur; None where none is known."""
-        known = self._known.get(number)
-        return None if known is None else known.newest
+    @property
+    def newest(self) -> dict[SpurNumber, Cane]:
+        """Each as it was seen last, by the spur beside it."""
+        return {number: known.newest for number, known in self._known.items()}
+
+    def lines(self) -> tuple[tuple[Vector3, ...], ...]:
+        """A few points of the axis of each for display (m, odom)."""
+        courses = (np.linspace(float(cane.arc[0]), cane.length, _LINE_POINTS) for cane in self.newest.values())
+        canes = zip(self.newest.values(), courses, strict=True)
+        return tuple(tuple(vector3(p) for p in interpolate(arcs, cane.arc, cane.axis)) for cane, arcs in canes)
 
     def sever(self, number: SpurNumber, position: Array) -> tuple[Capsule, ...]:
         """Forget the one beside a spur that was severed at a position (3, m, odom).

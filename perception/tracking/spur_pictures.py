@@ -7,7 +7,7 @@ outside it. The drawing changes with the image and with the revisions of the spu
 import dataclasses
 import hashlib
 import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import islice
 
 import numpy as np
@@ -95,6 +95,10 @@ class _Wood:
     also_falls: tuple[Array, ...] = ()
 
 
+#: Where nothing is known of any.
+NO_OLD_CANES: Mapping[SpurNumber, Cane] = {}
+
+
 class SpurPictures:
     """At most one picture for each spur."""
 
@@ -128,7 +132,11 @@ class SpurPictures:
         self._views.pop(number, None)
 
     def update(
-        self, points: Sequence[PruningPoint], sites: Iterable[SpurNumber], plant_map: PlantMap
+        self,
+        points: Sequence[PruningPoint],
+        sites: Iterable[SpurNumber],
+        plant_map: PlantMap,
+        old_canes: Mapping[SpurNumber, Cane] = NO_OLD_CANES,
     ) -> tuple[SpurPicture, ...]:
         """The pictures of all spurs with a point and of all undecided ones, those seen so far.
 
@@ -136,6 +144,7 @@ class SpurPictures:
             points: All points.
             sites: Undecided spurs.
             plant_map: The vines.
+            old_canes: Last year's canes by the spur beside them.
         """
         cuts: dict[SpurNumber, list[PruningPoint]] = {number: [] for number in sites}
         for point in points:
@@ -158,7 +167,10 @@ class SpurPictures:
                 continue
             key = (image.jpeg, len(spur.canes), tuple((point.point_id, point.revision) for point in here))
             if number not in self._drawn or self._drawn[number][0] != key:
-                self._drawn[number] = key, SpurPicture(drawing=_draw(image, spur, here), jpeg=image.jpeg)
+                self._drawn[number] = (
+                    key,
+                    SpurPicture(drawing=_draw(image, spur, here, old_canes.get(number)), jpeg=image.jpeg),
+                )
         self._drawn = {number: drawn for number, drawn in self._drawn.items() if number in cuts}
         return tuple(picture for _, picture in self._drawn.values())
 
@@ -219,7 +231,7 @@ def _encode(view: View, window: _Window) -> _Image:
         scale /= 2.0
 
 
-def _draw(image: _Image, spur: KnownSpur, points: Sequence[PruningPoint]) -> SpurDrawing:
+def _draw(image: _Image, spur: KnownSpur, points: Sequence[PruningPoint], old_cane: Cane | None) -> SpurDrawing:
     k, window = image.view.intrinsics, image.window
     return SpurDrawing(
         vine=spur.number.vine,
@@ -230,13 +242,13 @@ def _draw(image: _Image, spur: KnownSpur, points: Sequence[PruningPoint]) -> Spu
         window=(window.left, window.top, window.width, window.height),
         size=(round(window.width * image.scale), round(window.height * image.scale)),
         canes=tuple(tuple(image.pixels(_sampled(cane.as_cane())[0])) for cane in spur.canes),
-        cuts=tuple(_draw_cut(image, spur, point) for point in points),
+        cuts=tuple(_draw_cut(image, spur, point, old_cane) for point in points),
     )
 
 
-def _draw_cut(image: _Image, spur: KnownSpur, point: PruningPoint) -> DrawnCut:
+def _draw_cut(image: _Image, spur: KnownSpur, point: PruningPoint, old_cane: Cane | None) -> DrawnCut:
     position = np.array(point.position)
-    wood = _wood(spur, point)
+    wood = _wood(spur, point, old_cane)
     _, _, z = image.view.pixels(position)[0]
     focal = image.view.intrinsics.fx
     # The axis goes through the cut, which is a mean over the frames while the axis is of one.
@@ -259,7 +271,7 @@ def _with_arc(image: _Image, points: Array, arc: Array) -> tuple[AxisPixel, ...]
     return tuple((u, v, round(s, 4)) for (u, v), s in at)
 
 
-def _wood(spur: KnownSpur, point: PruningPoint) -> _Wood:
+def _wood(spur: KnownSpur, point: PruningPoint, old_cane: Cane | None) -> _Wood:
     position, tangent = np.array(point.position), np.array(point.tangent)
     if point.kind == "renewal cut":
         # The point's tangent is a mean over the frames; the stub's axis in a single one may be far off.
@@ -268,7 +280,9 @@ def _wood(spur: KnownSpur, point: PruningPoint) -> _Wood:
         falling = {at: _sampled(cane)[0] for at, cane in beyond.items() if at > 0.0}
         ends = np.array([-_STUB, 0.0, max(falling, default=_STUB)])
         return _Wood(position + ends[:, None] * tangent, ends, also_falls=tuple(falling.values()))
-    own = [] if point.kind == "removal" else [known.as_cane() for known in spur.canes]
+    own = [known.as_cane() for known in spur.canes]
+    if point.kind == "removal":
+        own = [] if old_cane is None else [old_cane]
     near = [(_nearest(each, position), each) for each in own]
     (gap, arc), cane = min(near, key=lambda each: each[0][0], default=((np.inf, 0.0), None))
     if cane is None or gap > _ON_CANE:

@@ -137,7 +137,9 @@ def test_the_old_stub_goes_whether_or_not_the_cut_of_the_keeper_is_known():
         np.testing.assert_allclose(cut.position, whole.position)
         assert cut.confidence < SURE, "nobody accepts it without a look"
     hidden = replace(unclear, base_gap=0.03)
-    assert apply_rule(spur(hidden, high), RULE) == Decision(undecided=(reasons.cane_base_hidden(),))
+    decision = apply_rule(spur(hidden, high), RULE)
+    assert not decision.cuts and decision.undecided == (reasons.cane_base_hidden(),) and not decision.contradicted
+    assert decision.about(reasons.cane_base_hidden()) == {"spur cut"}
 
 
 def leaving(base, angle, towards=1.0, deep=0.0):

@@ -139,12 +139,13 @@ def _judge_spur(
     )
 
 
-def shortening_cut(chain: list[tuple[int, Rod]], kept: int) -> RightCut | None:
+def shortening_cut(chain: list[tuple[int, Rod]], kept: int, fruiting: bool = False) -> RightCut | None:
     """The right cut of a cane for a number of kept nodes; None where it has fewer.
 
     Args:
         chain: Its rods with their indices, base first.
         kept: Count nodes that stay.
+        fruiting: The cane will be tied along the wire, so that any place before the next node is right.
     """
     nodes = [k for k, (_, rod) in enumerate(chain) if rod.kind == "node"]
     if len(nodes) <= kept:
@@ -158,6 +159,8 @@ def shortening_cut(chain: list[tuple[int, Rod]], kept: int) -> RightCut | None:
         following = _length(chain[nodes[kept + 1]][1]) / 2
         if half + length + following < SHORT_INTERNODE:
             best = (half + length + following) / 2 - half
+    if fruiting and len(nodes) > kept + 1:
+        most = max(most, length - BEFORE_NEXT)
     least, most = max(least, 0.0), min(most, length)
     return right_cut(index, rod, least, min(max(best, least), most), most)
 
@@ -192,6 +195,8 @@ def _length(rod: Rod) -> float:
 
 #: Nodes on the cane that will fruit.
 FRUITING_NODES = 8
+#: Wood kept before the next node of a cane that will fruit (m).
+BEFORE_NEXT = 0.010
 #: Old cane left at the head, and kept free before its first shoot (m).
 _STUMP, _BEFORE_SHOOT = 0.03, 0.02
 
@@ -237,7 +242,7 @@ def judge_guyot(row: Row) -> tuple[GuyotTruth, ...]:
                 lower=lower,
                 upper=upper,
                 spur_cut=shortening_cut(chains[vine][lower], KEPT_NODES),
-                cane_cut=shortening_cut(chains[vine][upper], FRUITING_NODES),
+                cane_cut=shortening_cut(chains[vine][upper], FRUITING_NODES, fruiting=True),
                 removal=right_cut(index, arm, _STUMP, _STUMP + 0.02, length - _BEFORE_SHOOT),
             )
         )
