@@ -359,3 +359,23 @@ def test_once_it_is_cut_off_it_is_no_obstacle_and_nobody_is_asked_for_it_again(s
     # With the rule before, the canes of its spur are cut as before.
     seen.answer(UndoRule(user="Ada", rule=rule))
     assert {each.kind for each in seen.points().points if each.vine == 1} == {"spur cut", "cane cut"}
+
+
+@pytest.mark.long
+def test_what_a_picture_told_against_a_cut_with_a_point_is_not_open_after_that_cut(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen = after(scene)
+    point = removal(seen)
+    assert point is not None
+    near = reasons.wire_near_cut(6.0)
+    refused = Decision.of({"removal": near}, (near,))
+    with monkeypatch.context() as patched:
+        patched.setattr("perception.pipeline.apply_rule", lambda *_: refused)
+        seen.process(scene.frames[2])
+    # The pictures after the cut show no spur.
+    monkeypatch.setattr("perception.pipeline.at_heads", lambda plant, *_: dataclasses.replace(plant, spurs=()))
+    for frame in drive(severed(scene, point.position), float(scene.truth.removal.least[0]), 5, reach=0.35):
+        seen.process(frame)
+    assert removal(seen) is None
+    assert [site for site in seen.points().undecided_sites if site.vine == 1] == []
