@@ -32,13 +32,13 @@ def wood_presence(
         labels: H×W class indices.
         positions: To check.
         aside: How far aside it may be seen (m).
-        kind: Of the cut of that wood. That of a removal may have the class of any wood.
+        kind: Of the cut of that wood. That of a removal may have the class of any wood, and it is not gone where
+            anything is at its depth: before bare ground the network loses it.
     """
-    classes = ANY_WOOD if kind == "removal" else (CANE, NODE, SPUR)
-    return [_at(view, labels, u, v, z, aside, classes) for u, v, z in view.pixels(positions).tolist()]
+    return [_at(view, labels, u, v, z, aside, kind == "removal") for u, v, z in view.pixels(positions).tolist()]
 
 
-def _at(view: View, labels: Labels, u: float, v: float, z: float, aside: float, classes: tuple[int, ...]) -> Presence:
+def _at(view: View, labels: Labels, u: float, v: float, z: float, aside: float, removal: bool) -> Presence:
     height, width = view.depth.shape
     radius = max(2, round(view.intrinsics.fx * aside / max(z, 0.1)))
     if z < _MIN_DEPTH or not (radius <= u < width - radius - 1 and radius <= v < height - radius - 1):
@@ -46,9 +46,12 @@ def _at(view: View, labels: Labels, u: float, v: float, z: float, aside: float, 
     row, col = round(v), round(u)
     window = slice(row - radius, row + radius + 1), slice(col - radius, col + radius + 1)
     depth = view.depth[window]
-    wood = np.isin(labels[window], classes)
-    if (wood & (np.abs(depth - z) < _SAME_DEPTH)).any():
+    wood = np.isin(labels[window], ANY_WOOD if removal else (CANE, NODE, SPUR))
+    here = np.abs(depth - z) < _SAME_DEPTH
+    if (wood & here).any():
         return "present"
+    if removal and here.any():
+        return "not visible"
     nearer = (depth > 0.0) & (depth < z - _SAME_DEPTH)
     undetermined = wood & ((depth == 0.0) | (depth > z + _OTHER_ROW))
     alike = np.isin(labels[window], (POST, TRUNK)) & (depth < z + _ALIKE_BEHIND)

@@ -239,7 +239,9 @@ class Tracker:
                 if track.published is not None and not self._confirmed(track):
                     withdrawn.append(self._withdraw_for_now(track, track.published))
                 continue
-            if track.gone >= self._config.gone_frames:
+            # Of last year's cane a single picture may have been wrong.
+            seen_often = track.published is not None or track.cut.kind != "removal"
+            if track.gone >= self._config.gone_frames and seen_often:
                 severed.append(Proposal(dataclasses.replace(track.cut, position=track.position), track.number))
             if track.published is not None:
                 self._withdrawn[track.point_id] = track.published

@@ -11,6 +11,7 @@ from perception.segmentation.frame import (
     BACKGROUND,
     CANE,
     CORDON,
+    GROUND,
     HOSE,
     NODE,
     OLD_CUT,
@@ -71,6 +72,13 @@ def test_what_is_no_wood_of_a_vine_is_no_last_years_cane(kind):
     seen = view()
     assert wood_presence(seen, np.full_like(seen.labels, kind), AT, kind="removal") != ["present"]
     assert wood_presence(view(cane_depth=0.9), seen.labels, AT, kind="removal") == ["gone"]
+
+
+def test_last_years_cane_is_not_gone_where_the_network_takes_it_for_the_ground():
+    seen = view()
+    ground = np.where(seen.labels == CANE, np.uint8(GROUND), seen.labels)
+    assert wood_presence(seen, ground, AT, kind="removal") == ["not visible"]
+    assert wood_presence(seen, ground, AT) == ["gone"], "thin canes may have the depth of what is behind them"
 
 
 @given(x=st.floats(-2, 2), y=st.floats(-2, 2), z=st.floats(-2, 3))
