@@ -246,7 +246,7 @@ class Perception:
         plant, numbers = self._numbering.numbered(plant, along, canes)
         spurs = self.plant_map.update(plant, numbers, _REACH[self._config.rule.system])
         old_canes = trace_old_canes(view, labels, self._config.skeleton) if guyot else []
-        old_of = beside_spurs(old_canes, plant, numbers)
+        old_of = beside_spurs(old_canes, plant, numbers, self._old_canes.newest)
         self._old_canes.see(old_of)
         cylinders = self._obstacle_map.update(view, labels, apart=self._old_wood(view))
         self._spur_pictures.add(view, plant, numbers)

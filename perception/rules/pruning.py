@@ -411,13 +411,17 @@ def _shorten(
     best = cut_arc(cane, config)
     if isinstance(best, Reason):
         return best
-    arc = clear_arc(cane, best, others, config, keep_out)
+    nodes = count_nodes(cane, config)
+    last = nodes[kept - 1].arc
+    # A fruiting cane is tied along the wire: the stub past its last node may be as long as the internode.
+    farthest = max(nodes[kept].arc - _BEFORE_NEXT - best, OUTWARD) if fruiting and len(nodes) > kept else OUTWARD
+    places = [best, *(np.arange(best + _STUMP_STEP, best + farthest, _STUMP_STEP).tolist() if fruiting else ())]
+    found = [clear_arc(cane, place, others, config, keep_out) for place in places]
+    arc = next((each for each in found if not isinstance(each, Reason)), found[0])
     if isinstance(arc, Reason):
         return arc
     if too_thick(cane.radius, config):
         return reasons.cane_beyond_shears(2000 * cane.radius)
-    nodes = count_nodes(cane, config)
-    last = nodes[kept - 1].arc
 
     def allowed(place: float) -> bool:
         hidden = any(span.overlaps(place - _VISIBLE_HALF_WIDTH, place + _VISIBLE_HALF_WIDTH) for span in cane.hidden)
@@ -426,8 +430,6 @@ def _shorten(
             return False
         return _obstructed(cane.at(place), others, config, keep_out) is None
 
-    # A fruiting cane is tied along the wire: the stub past its last node may be as long as the internode.
-    farthest = max(nodes[kept].arc - _BEFORE_NEXT - best, OUTWARD) if fruiting and len(nodes) > kept else OUTWARD
     return Cut(
         kind="cane cut" if fruiting else "spur cut",
         position=cane.at(arc),

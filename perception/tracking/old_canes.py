@@ -27,6 +27,9 @@ _MIN_OBSERVATIONS, _TOLERANCE = 3, 0.010
 _RADIUS_TOLERANCE = 0.001
 #: Points of its line on the page.
 _LINE_POINTS = 8
+#: Where nothing is known of any, and the largest distance of two places where one leaves its trunk (m).
+NOTHING_KNOWN: Mapping[SpurNumber, Cane] = {}
+_SAME_BASE = 0.05
 #: A severed place is on it within this distance (m).
 _ON_CANE = 0.02
 #: So many are obstacles, those nearest to the camera: the message is as long in a long row.
@@ -35,6 +38,8 @@ _MOST = 16
 
 def at_heads(plant: Plant, uprights: Sequence[Capsule], along: Array) -> Plant:
     """A plant with the spurs at the heads of its vines; canes of others are without a spur.
+
+    What shows no cane beside one that does is a piece of it, or a knot of the head.
 
     Args:
         plant: Of one frame.
@@ -46,17 +51,41 @@ def at_heads(plant: Plant, uprights: Sequence[Capsule], along: Array) -> Plant:
     def at_head(spur: Spur) -> bool:
         return bool(np.abs(heads - float(spur.position @ along)).min(initial=np.inf) < _AT_HEAD)
 
+    def is_piece(spur: Spur) -> bool:
+        return not spur.canes and any(distance(spur.position, each.position) < 2 * _AT_HEAD for each in bearing)
+
+    bearing = [spur for spur in plant.spurs if spur.canes and at_head(spur)]
+    spurs = tuple(spur for spur in plant.spurs if at_head(spur) and not is_piece(spur))
     others = [cane.axis for spur in plant.spurs if not at_head(spur) for cane in spur.canes]
-    return replace(plant, spurs=tuple(filter(at_head, plant.spurs)), unrooted=(*plant.unrooted, *others))
+    return replace(plant, spurs=spurs, unrooted=(*plant.unrooted, *others))
 
 
-def beside_spurs(canes: Sequence[Cane], plant: Plant, numbers: Sequence[SpurNumber]) -> dict[SpurNumber, Cane]:
-    """Last year's canes of one frame by the spur beside them, each beside the nearest; a spur has the nearest one."""
+def beside_spurs(
+    canes: Sequence[Cane], plant: Plant, numbers: Sequence[SpurNumber], known: Mapping[SpurNumber, Cane] = NOTHING_KNOWN
+) -> dict[SpurNumber, Cane]:
+    """Last year's canes of one frame by the spur beside them; a spur has the nearest one.
+
+    Each is beside the spur that it was beside before, else of those within reach the nearest one of those with canes.
+
+    Args:
+        canes: Of the frame.
+        plant: Of the same frame.
+        numbers: Of its spurs, in their order.
+        known: As they were seen last, by spur.
+    """
     found: dict[SpurNumber, tuple[float, Cane]] = {}
     for cane in canes:
-        away = [(distance(spur.position, cane.base), number) for spur, number in zip(plant.spurs, numbers, strict=True)]
-        gap, number = min(away, default=(np.inf, SpurNumber(0, 0)))
-        if gap < _OF_SPUR and gap < found.get(number, (np.inf, cane))[0]:
+        before = {number: distance(old.origin, cane.origin) for number, old in known.items()}
+        away = [
+            (before.get(number, np.inf) > _SAME_BASE, not spur.canes, distance(spur.position, cane.base), number)
+            for spur, number in zip(plant.spurs, numbers, strict=True)
+        ]
+        reach = [each for each in away if each[2] < _OF_SPUR]
+        held = min((number for number, gap in before.items() if gap < _SAME_BASE), default=None)
+        if not reach or held is not None and held not in numbers:
+            continue
+        _, _, gap, number = min(reach)
+        if gap < found.get(number, (np.inf, cane))[0]:
             found[number] = gap, cane
     return {number: cane for number, (_, cane) in found.items()}
 
