@@ -80,6 +80,26 @@ def test_last_years_cane_is_beside_the_nearest_spur_within_reach_and_each_has_on
     assert beside_spurs([near], plant(), ()) == {}
 
 
+def test_last_years_cane_stays_beside_the_spur_of_which_it_was_told_and_prefers_one_with_canes() -> None:
+    knot, bearing = SpurNumber(1, 2), cane(0.52, 0.7)
+    seen, numbers = plant(spur(0.53), spur(0.58, bearing)), (knot, FIRST)
+    assert beside_spurs([cane(0.53)], seen, numbers).keys() == {FIRST}, "a knot is nearer, but no spur"
+    bearing_too = plant(spur(0.53, bearing), spur(0.58, bearing))
+    assert beside_spurs([cane(0.53)], bearing_too, numbers).keys() == {knot}
+    told = {FIRST: cane(0.54)}
+    assert beside_spurs([cane(0.53)], bearing_too, numbers, told).keys() == {FIRST}
+    # Where its spur is not in the picture, it is nobody else's.
+    assert beside_spurs([cane(0.53)], plant(spur(0.53, bearing)), (knot,), told) == {}
+    assert beside_spurs([cane(0.53)], bearing_too, numbers, {SECOND: cane(2.3)}).keys() == {knot}
+
+
+def test_what_shows_no_cane_beside_a_spur_of_the_same_head_is_no_spur() -> None:
+    bearing = spur(0.53, cane(0.52, 0.7))
+    seen = plant(bearing, spur(0.46), spur(2.3), trunks=(0.5, 2.3))
+    assert [each.position[0] for each in at_heads(seen, (), ALONG).spurs] == [0.53, 2.3], "another head's stays"
+    assert len(at_heads(plant(spur(0.46), trunks=(0.5,)), (), ALONG).spurs) == 1
+
+
 def known(*looks: Cane, number: SpurNumber = FIRST) -> OldCanes:
     canes = OldCanes()
     for each in looks:

@@ -451,6 +451,24 @@ def test_doubts_end_in_no_cut():
     assert [cut.kind for cut in thick.cuts] == ["spur cut"]
 
 
+def test_a_fruiting_cane_is_cut_farther_out_where_a_wire_is_beside_it_and_before_the_next_node():
+    # The eighth node is at 0.66 m, the ninth at 0.74 m.
+    def cane_cut(height):
+        wire = KeepOut(lambda at: WIRE if abs(at[2] - height) < 0.0165 else None, lambda position, tangent: True)
+        decision = apply_rule(guyot_spur(LOWER, UPPER), GUYOT, None, wire)
+        return next((cut for cut in decision.cuts if cut.kind == "cane cut"), decision.undecided)
+
+    free = cane_cut(0.0)
+    assert free.offset == pytest.approx(0.02) and free.outward == pytest.approx(0.74 - 0.022 - 0.68, abs=0.0011)
+    beside = cane_cut(0.93 + 0.68)
+    assert beside.offset > 0.0365 and beside.position[2] + beside.outward < 0.93 + 0.74 - 0.02
+    # Only a fruiting cane may have so long a stub.
+    spur_cut = apply_rule(guyot_spur(LOWER, UPPER), GUYOT).cuts[0]
+    assert spur_cut.kind == "spur cut" and spur_cut.outward < 0.0071
+    low = KeepOut(lambda at: WIRE if abs(at[2] - 1.10) < 0.0165 else None, lambda position, tangent: True)
+    assert WIRE in apply_rule(guyot_spur(LOWER, UPPER), GUYOT, None, low).undecided
+
+
 def old_cane(begin=0.01, length=0.5, radius=0.0068, **changes):
     """From the trunk outwards and up; `begin` is hidden."""
     arc = np.linspace(begin, length, 100)
