@@ -557,7 +557,7 @@ class Perception:
         unconfirmed: Collection[Site] = (),
     ) -> None:
         causes = [(decision.about(reason), reason) for reason in decision.undecided]
-        # One picture hides what others have shown. Nor is what was told against a cut open once that cut is made.
+        # One picture may hide what others have shown. Stored, such a reason would be told again once the cut is made.
         settled = {kind for site, kind in self._tracker.settled if site == number}
         causes = [(against, reason) for against, reason in causes if not against or against - settled]
         # A vine has one cane of last year: it may be beside another spur of its head, or cut off.

@@ -19,7 +19,7 @@ from benchmarks.common.documents import bench_parser, write
 from benchmarks.common.intervals import Figure, share
 from benchmarks.control.cut_truth import STUB, WantedCut, wanted_cuts
 from benchmarks.perception.blocked import Blocker, blocked_by
-from bridge.sim.vineyard.config import GUYOT_ROW_DISTANCE, VineyardConfig
+from bridge.sim.vineyard.config import GUYOT_ROW, VineyardConfig
 from bridge.sim.vineyard.grow import grow
 from bridge.sim.vineyard.row import Row
 from bridge.sim.vineyard.truth import FRUITING_NODES, KEPT_NODES, RightCut, staying_rods
@@ -83,7 +83,7 @@ class Oracle:
         config = load_section(path, "controller", ControllerConfig)
         robot = load_section(path, "robot", RobotConfig)
         self._clearance = CutClearance(RobotModel(robot), config.whole_body.hierarchy)
-        work = replace(config.work, row_distance=GUYOT_ROW_DISTANCE) if guyot else config.work
+        work = replace(config.work, row_distance=GUYOT_ROW.row_distance) if guyot else config.work
         self._search = PostureSearch(RobotModel(robot), work, config.whole_body.joint_margin, self._clearance)
         self._home = np.array(config.work.home)
 
@@ -177,10 +177,7 @@ def cane_lines(row: Row) -> tuple[tuple[m.Vector3, ...], ...]:
 
 def look(oracle: Oracle, seed: int, vines: int, guyot: bool = False) -> list[Found]:
     """Every right cut of a grown row."""
-    config, found = VineyardConfig(vines=vines), list[Found]()
-    if guyot:
-        config = replace(config, training="guyot", row_distance=GUYOT_ROW_DISTANCE)
-    row = grow(config, seed)
+    row, found = grow(replace(GUYOT_ROW if guyot else VineyardConfig(), vines=vines), seed), list[Found]()
     for wanted in wanted_cuts(row, guyot):
         if (cut := wanted.cut) is None:
             continue

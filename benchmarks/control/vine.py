@@ -33,7 +33,7 @@ from benchmarks.peers.rows import PEERS, use_peers
 from benchmarks.perception.blocked import Blocker, blocked_by
 from benchmarks.perception.judge import nearest_rod
 from bridge.sim.robot import trace
-from bridge.sim.vineyard.config import GUYOT_ROW_DISTANCE, VineyardConfig
+from bridge.sim.vineyard.config import GUYOT_ROW, VineyardConfig
 from bridge.sim.vineyard.config import PRESETS as CULTIVARS
 from bridge.sim.vineyard.row import Row
 from bridge.sim.vineyard.truth import staying_rods
@@ -603,7 +603,7 @@ def one_vine(training: Training, length: float, cultivar: str) -> dict[str, dict
     row: dict[str, object] = {"preset": cultivar, "vines": 1, "first_vine_x": _CAMERA_AHEAD + length / 2}
     if training == "spur":
         return {"vineyard": row}
-    beside: dict[str, object] = {"row_distance": GUYOT_ROW_DISTANCE}
+    beside: dict[str, object] = {"row_distance": GUYOT_ROW.row_distance}
     return {
         "vineyard": {**row, **beside, "training": "guyot"},
         "controller.work": beside,

@@ -29,7 +29,7 @@ from benchmarks.perception.looks import CloseCamera, Looks, look_again, summaris
 from bridge.sim.camera.config import CameraConfig
 from bridge.sim.camera.frame import camera_frame, camera_pose, survey_place
 from bridge.sim.camera.renderer import Camera
-from bridge.sim.vineyard.config import GUYOT_ROW_DISTANCE, VineyardConfig
+from bridge.sim.vineyard.config import GUYOT_ROW, VineyardConfig
 from bridge.sim.vineyard.grow import grow
 from bridge.sim.world.config import CALM, PRESETS, WorldConfig, only
 from bridge.sim.world.growth import overgrown
@@ -103,9 +103,7 @@ def survey_row(
         world: Disturbances of row and camera.
     """
     guyot = perception.config.rule.system == "guyot"
-    config = VineyardConfig(vines=vines)
-    if guyot:
-        config = replace(config, training="guyot", row_distance=GUYOT_ROW_DISTANCE)
+    config = replace(GUYOT_ROW if guyot else VineyardConfig(), vines=vines)
     row = overgrown(grow(config, seed), world, seed)
     camera = Camera(camera_config, seed, world)
     opinion = GuyotJudge(row, seed) if guyot else RowJudge(row, seed)

@@ -52,9 +52,9 @@ _BASE, _LEAST_SINE, _THICK = 0.025, 0.2, 0.015
 #: Reasons against a cut that other pictures propose: they see its nodes or canes otherwise. All others only tell that a
 #: picture shows too little.
 _AGAINST = {"nodes_side_by_side", "nodes_far_apart", "cane_below_keeper", "keeper_close"}
-#: Last year's cane is cut so far from its trunk, and farther out where there is no room, up to here (m). A stump of
-#: twice its diameter or more dries, and the head stays sound.
-_STUMP, _LONGEST_STUMP, _STUMP_STEP = 0.04, 0.12, 0.01
+#: Last year's cane is cut so far from its trunk, and farther out where there is no room, up to here, in steps
+#: (m). A stump of twice its diameter or more dries, and the head stays sound.
+_STUMP, _LONGEST_STUMP, _SEARCH_STEP = 0.04, 0.12, 0.01
 #: By so much nearer to the trunk it may be cut (m).
 _SHORTER_STUMP = 0.01
 
@@ -97,7 +97,7 @@ class Cut:
 
 @dataclass(frozen=True)
 class Decision:
-    """Cuts of one spur, the reasons for what is left undecided, and those why a kind of cut is not proposed."""
+    """Cuts of one spur, the reasons that are told, and for each kind of cut without a proposal the reason."""
 
     cuts: tuple[Cut, ...] = ()
     undecided: tuple[Reason, ...] = ()
@@ -230,7 +230,7 @@ def _remove(old: Cane | None, others: list[Array], config: RuleConfig, keep_out:
             return reasons.cut_place_hidden()
         return _obstructed(old.at(arc), others, config, keep_out)
 
-    places = np.arange(_STUMP, _LONGEST_STUMP + _STUMP_STEP / 2, _STUMP_STEP).tolist()
+    places = np.arange(_STUMP, _LONGEST_STUMP + _SEARCH_STEP / 2, _SEARCH_STEP).tolist()
     arc = next((place for place in places if refused(place) is None), None)
     if arc is None:
         return refused(_STUMP) or reasons.cut_place_hidden()
@@ -415,7 +415,7 @@ def _shorten(
     last = nodes[kept - 1].arc
     # A fruiting cane is tied along the wire: the stub past its last node may be as long as the internode.
     farthest = max(nodes[kept].arc - _BEFORE_NEXT - best, OUTWARD) if fruiting and len(nodes) > kept else OUTWARD
-    places = [best, *(np.arange(best + _STUMP_STEP, best + farthest, _STUMP_STEP).tolist() if fruiting else ())]
+    places = [best, *(np.arange(best + _SEARCH_STEP, best + farthest, _SEARCH_STEP).tolist() if fruiting else ())]
     found = [clear_arc(cane, place, others, config, keep_out) for place in places]
     arc = next((each for each in found if not isinstance(each, Reason)), found[0])
     if isinstance(arc, Reason):

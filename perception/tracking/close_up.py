@@ -142,7 +142,7 @@ def check_close_up(
     beyond = wood_presence(part, labels, probe, kind=point.kind)[0]
     cane = None if point.kind == "removal" else _cane_at(position, along, lines, limits)
     if cane is None:
-        # A cane hides its base, where it leaves the stub.
+        # A renewal cut is on a stub, and a removal on last year's cane.
         wood = wood_of_cut(labels, "removal" if point.kind == "removal" else "renewal cut")
         cane = _cane_at(position, along, trace_canes(part, wood, config.skeleton), limits)
     gone = beyond == "gone" and not _may_stand_aside(probe, along, lines, known, shift, limits)

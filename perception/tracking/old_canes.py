@@ -1,6 +1,6 @@
-"""Last year's canes of Guyot vines, over all frames, and what stands at the head of a vine.
+"""Last year's canes of Guyot vines over all frames, and which spurs are at the head of a vine.
 
-The spurs of a Guyot vine are at its head. What else looks like one is a shoot of last year's cane, and goes with it.
+A Guyot vine has its spurs at the head. Other wood that looks like a spur is a shoot of last year's cane.
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,8 +27,9 @@ _MIN_OBSERVATIONS, _TOLERANCE = 3, 0.010
 _RADIUS_TOLERANCE = 0.001
 #: Points of its line on the page.
 _LINE_POINTS = 8
-#: Where nothing is known of any, and the largest distance of two places where one leaves its trunk (m).
-NOTHING_KNOWN: Mapping[SpurNumber, Cane] = {}
+#: Where none is known.
+NO_OLD_CANES: Mapping[SpurNumber, Cane] = {}
+#: Largest distance of two places where the same one leaves its trunk (m).
 _SAME_BASE = 0.05
 #: A severed place is on it within this distance (m).
 _ON_CANE = 0.02
@@ -61,7 +62,7 @@ def at_heads(plant: Plant, uprights: Sequence[Capsule], along: Array) -> Plant:
 
 
 def beside_spurs(
-    canes: Sequence[Cane], plant: Plant, numbers: Sequence[SpurNumber], known: Mapping[SpurNumber, Cane] = NOTHING_KNOWN
+    canes: Sequence[Cane], plant: Plant, numbers: Sequence[SpurNumber], known: Mapping[SpurNumber, Cane] = NO_OLD_CANES
 ) -> dict[SpurNumber, Cane]:
     """Last year's canes of one frame by the spur beside them; a spur has the nearest one.
 

@@ -19,6 +19,7 @@ from perception.plant.model import Cane, Plant
 from perception.plant.numbering import SpurNumber
 from perception.segmentation.frame import CorruptFrameError, View
 from perception.tracking.camera_rays import Ray
+from perception.tracking.old_canes import NO_OLD_CANES
 from rolling_panda.messages.perception import (
     PICTURE_BYTES,
     AxisPixel,
@@ -93,10 +94,6 @@ class _Wood:
     arc: Array
     nodes: tuple[float, ...] = ()
     also_falls: tuple[Array, ...] = ()
-
-
-#: Where nothing is known of any.
-NO_OLD_CANES: Mapping[SpurNumber, Cane] = {}
 
 
 class SpurPictures:

@@ -97,7 +97,7 @@ class Truth:
 
 
 class Vine(RobotWorld):
-    """A simulated robot before one Guyot vine, with an operator who is always there."""
+    """A simulated robot in front of one Guyot vine. An operator is connected all the time."""
 
     def __init__(self, seed: int, folder: Path, world: WorldConfig) -> None:
         settings = one_vine("guyot", VineyardConfig().vine_spacing, "standard")

@@ -1,4 +1,4 @@
-"""Last year's canes of Guyot vines: where they are, what is beside them, and what becomes of their removal."""
+"""Last year's canes of Guyot vines: their place, the spur beside them, and their removal."""
 
 import dataclasses
 from dataclasses import dataclass

@@ -78,7 +78,7 @@ def test_last_years_cane_is_not_gone_where_the_network_takes_it_for_the_ground()
     seen = view()
     ground = np.where(seen.labels == CANE, np.uint8(GROUND), seen.labels)
     assert wood_presence(seen, ground, AT, kind="removal") == ["not visible"]
-    assert wood_presence(seen, ground, AT) == ["gone"], "thin canes may have the depth of what is behind them"
+    assert wood_presence(seen, ground, AT) == ["gone"], "a thin cane can have the depth of the wood behind it"
 
 
 @given(x=st.floats(-2, 2), y=st.floats(-2, 2), z=st.floats(-2, 3))

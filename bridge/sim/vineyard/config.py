@@ -131,8 +131,8 @@ class VineyardConfig(Struct, frozen=True, forbid_unknown_fields=True):
             raise ConfigError("[vineyard] nodes would overlap; shorten node_length or lengthen basal and internode")
 
 
-#: A row of Guyot vines is driven along at this distance (m): their last cut is as high as the arm reaches.
-GUYOT_ROW_DISTANCE = 0.55
+#: Guyot vines, and the distance at which the robot drives along them: their last cut is as high as the arm reaches.
+GUYOT_ROW = VineyardConfig(training="guyot", row_distance=0.55)
 
 #: Vines that differ as cultivars do in what matters to winter pruning; they are named after the trait, as site and year
 #: change these numbers as much as the cultivar does. Spreads without a source are chosen.
